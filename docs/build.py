@@ -1,0 +1,143 @@
+"""Commands and settings -> docs/reference/cli.md and config.md; `--check` writes nothing and exits 1 if one is stale."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import json
+import sys
+import typing
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import click
+
+from wallkit.cli.app import main as wallkit
+from wallkit.core.config import name_in
+from wallkit.pipelines.config import Config
+
+REFERENCE = Path(__file__).parent / "reference"
+NOTE = "<!-- Written by `python docs/build.py`: change the docstring or the option in the code, not this page. -->"
+
+
+def cli_page() -> str:
+    """Every command with its arguments, options and examples."""
+    intro = "Every command with `--help` says the same. `-h` and `--help` work everywhere and are left out below."
+    lines = ["# Commands", "", NOTE, "", intro]
+    for words, command, ctx in commands(wallkit, "wallkit"):
+        lines += ["", f"## `{words}`", "", "```text", " ".join([words, *command.collect_usage_pieces(ctx)]), "```"]
+        for paragraph in inspect.cleandoc(command.help or "").split("\n\n"):
+            lines += ["", *(_example(paragraph) if paragraph.startswith("\b") else [_one_line(paragraph)])]
+        options = (p for p in command.params if isinstance(p, click.Option) and p.name not in ("help", "version"))
+        rows = [(f"`{names}`", text) for names, text in (option.get_help_record(ctx) or ("", "") for option in options)]
+        lines += ["", *_table(("option", "meaning"), rows)] if rows else []
+    return "\n".join(lines) + "\n"
+
+
+def commands(command: click.Command, words: str, parent: click.Context | None = None) -> Iterator[Any]:
+    """(words, command, context) of a command and of everything below it."""
+    ctx = click.Context(command, info_name=words.rpartition(" ")[2], parent=parent)
+    yield words, command, ctx
+    for name in command.list_commands(ctx) if isinstance(command, click.Group) else ():
+        inner = command.get_command(ctx, name)
+        if inner is not None:
+            yield from commands(inner, f"{words} {name}", ctx)
+
+
+def config_page() -> str:
+    """Every setting with its default, range and meaning, and every part that can be chosen by name."""
+    intro = (
+        "A setting is written in `wallkit.toml` under its table, or given as `--set KEY=VALUE`. A flag beats `--set`,"
+        " `--set` beats the file, the file beats the default. `wallkit config show` prints the values in use and where"
+        " each comes from.\n\nA part with several alternatives is chosen by its name:"
+        ' `--set localize.sensor=beam`, or `sensor.name = "beam"` in the file. `package.module:Name` takes your own'
+        " ([how](../how-to/add-a-sensor-model.md))."
+    )
+    lines = ["# Settings", "", NOTE, "", intro, *_settings(Config, (), 2)]
+    return "\n".join(lines) + "\n"
+
+
+def _settings(cls: type[Any], key: tuple[str, ...], level: int) -> Iterator[str]:
+    """The table of a settings class, then everything below it."""
+    hints = typing.get_type_hints(cls)
+    fields = dataclasses.fields(cls)
+    plain = [f for f in fields if "registry" not in f.metadata and not dataclasses.is_dataclass(hints[f.name])]
+    rows = [(f"`{'.'.join((*key, f.name))}`", _default(f), _range(f, hints[f.name]), f.metadata["doc"]) for f in plain]
+    yield from ("", *_table(("setting", "default", "range", "meaning"), rows)) if rows else ("", "No settings.")
+    for f in (f for f in plain if "choice" in f.metadata):
+        choices = [
+            (f"`{name}`", _one_line(inspect.getdoc(entry) or "")) for name, entry in f.metadata["choice"].items()
+        ]
+        yield from ("", f"{'#' * level} `{'.'.join((*key, f.name))}`", "", _sentence(f), "")
+        yield from _table(("name", "what it does"), choices)
+    for f in (f for f in fields if f not in plain):
+        here = (*key, f.name)
+        yield from ("", f"{'#' * level} `[{'.'.join(here)}]`", "", _sentence(f))
+        if "registry" not in f.metadata:
+            yield from _settings(hints[f.name], here, level + 1)
+            continue
+        registry = f.metadata["registry"]
+        default = name_in(registry, f.default_factory())  # type: ignore[misc]
+        yield from ("", f"One of {', '.join(f'`{name}`' for name in registry)}; default `{default}`.")
+        for name, entry in registry.items():
+            yield from ("", f"{'#' * (level + 1)} `{'.'.join(here)}` = `{name}`", "", inspect.getdoc(entry) or "")
+            yield from _settings(entry, here, level + 2)
+
+
+def _default(f: dataclasses.Field[Any]) -> str:
+    value = f.default
+    return f"`{json.dumps(list(value) if isinstance(value, tuple) else value)}`"
+
+
+def _range(f: dataclasses.Field[Any], hint: Any) -> str:
+    if typing.get_origin(hint) is typing.Literal or "choice" in f.metadata:
+        return ", ".join(f"`{name}`" for name in f.metadata.get("choice") or typing.get_args(hint))
+    low, high = f.metadata["low"], f.metadata["high"]
+    if low is not None or high is not None:
+        return f"{low} to {high}" if None not in (low, high) else f"≥ {low}" if high is None else f"≤ {high}"
+    return {bool: "`true`, `false`", str: "text", float: "any number"}.get(hint, "list")
+
+
+def _sentence(f: dataclasses.Field[Any]) -> str:
+    text = str(f.metadata["doc"])
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def _example(paragraph: str) -> list[str]:
+    title, *rest = paragraph.removeprefix("\b").strip("\n").splitlines()
+    return [title, "", "```text", *(line.removeprefix("  ") for line in rest), "```"]
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split("\n\n")[0].split())
+
+
+def _table(headers: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:
+    return [f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |" for row in _with_rule(headers, rows)]
+
+
+def _with_rule(headers: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[tuple[str, ...]]:
+    return [headers, tuple("---" for _ in headers), *rows]
+
+
+PAGES = {"cli.md": cli_page, "config.md": config_page}
+
+
+def main(is_check: bool) -> int:
+    """Write the pages, or say which are stale."""
+    stale = []
+    for name, page in PAGES.items():
+        path, text = REFERENCE / name, page()
+        if path.is_file() and path.read_text(encoding="utf-8") == text:
+            continue
+        stale.append(name)
+        if not is_check:
+            path.write_text(text, encoding="utf-8", newline="\n")
+    if is_check and stale:
+        print(f"stale: {', '.join(stale)}; run `python docs/build.py`", file=sys.stderr)
+    return 1 if is_check and stale else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main("--check" in sys.argv[1:]))

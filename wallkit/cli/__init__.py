@@ -1,0 +1,1 @@
+"""Words -> pipelines; the only floor that prints or exits."""

@@ -1,0 +1,34 @@
+"""The command line: every word that can follow `wallkit`."""
+
+from __future__ import annotations
+
+import click
+
+import wallkit
+from wallkit.cli.bench import bench
+from wallkit.cli.common import CONTEXT, WallkitGroup
+from wallkit.cli.config import completion, config
+from wallkit.cli.demo import demo
+from wallkit.cli.doctor import doctor
+from wallkit.cli.evaluate import compare, evaluate, report
+from wallkit.cli.localize import localize
+from wallkit.cli.log import log
+
+
+@click.group(cls=WallkitGroup, context_settings=CONTEXT)
+@click.version_option(wallkit.__version__, message="%(prog)s %(version)s")
+def main() -> None:
+    """Finds where an indoor robot is, from recorded LiDAR + camera logs and a map of walls.
+
+    \b
+    Start here:
+      wallkit demo                                   the main job on the sample inside the package
+      wallkit log info log.mcap                      what is in a log, and can it be localized?
+      wallkit localize log.mcap --map floor.yaml     where was the robot?
+
+    Exit codes: 0 good, 1 bad verdict, 2 could not do it, 3 done but data was lost, 4 cannot tell, 130 interrupted.
+    """
+
+
+for command in (demo, log, localize, evaluate, compare, report, bench, config, completion, doctor):
+    main.add_command(command)

@@ -1,0 +1,217 @@
+"""`wallkit evaluate`, `compare` and `report`: what runs are worth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from wallkit.cli import common
+
+if TYPE_CHECKING:
+    from wallkit.pipelines.evaluate import EvaluateSettings, Evaluation
+    from wallkit.pipelines.run_folder import RunRecord
+
+RUNS = click.argument("runs", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RUN...")
+truth_option = click.option(
+    "--truth", type=click.Path(path_type=Path), metavar="FILE.tum", help="True poses; else the run's own truth."
+)
+
+
+@click.command()
+@RUNS
+@truth_option
+@click.option("--t-offset", type=float, metavar="S", help="Added to the stamps of the truth.")
+@click.option("--max-ate-m", type=float, metavar="M", help="Exit 1 if the rmse of any run is above.")
+@click.option("--evo", is_flag=True, help="Also write result zips for evo_res into --out.")
+@common.out_option
+@common.config_option
+@common.set_option
+@common.json_option
+@click.pass_context
+def evaluate(ctx: click.Context, /, runs: tuple[Path, ...], as_json: bool, **flags: Any) -> None:
+    """Say how wrong runs were, how fast they converged, and whether they knew.
+
+    RUN is a result folder of wallkit localize; a folder of several seeds counts as all of them, and gets mean, sd and worst.
+
+    Exits 0, or 1 if a run is worse than --max-ate-m.
+
+    \b
+    Examples:
+      wallkit evaluate log.wallkit
+      wallkit evaluate log.wallkit --truth mocap.tum --max-ate-m 0.1
+      wallkit evaluate log.wallkit --json | jq .metrics.ate_rmse_m
+    """
+    settings = _settings(flags["config_path"], flags["words"], flags["t_offset"])
+    found = [pair for run in runs for pair in load_seeds(run, settings, flags["truth"])]
+    if as_json:
+        common.emit(_document(found))
+    else:
+        click.echo(_table(found))
+    if flags["evo"]:
+        _write_evo(flags["out"], found)
+    limit = flags["max_ate_m"]
+    if limit is not None:
+        worst = max(_ate_of(record, evaluation) for record, evaluation in found)
+        if not worst <= limit:
+            click.echo(f"error {worst:.4f} m is above {limit:g} m", err=True)
+            ctx.exit(common.FAILED_CHECK)
+
+
+@click.command()
+@RUNS
+@truth_option
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path), metavar="FILE.html", help="Write the comparison as a page."
+)
+@common.config_option
+@common.set_option
+@common.seed_option
+@common.json_option
+def compare(runs: tuple[Path, ...], truth: Path | None, out: Path | None, as_json: bool, **flags: Any) -> None:
+    """Put several runs side by side, with tests of significance against the first.
+
+    \b
+    Examples:
+      wallkit compare basic.wallkit filtered.wallkit
+      wallkit compare a/ b/ c/ -o compare.html
+    """
+    from dataclasses import asdict
+
+    from wallkit.pipelines.report import compare_runs, write_compare_report
+    from wallkit.report.compare import compare_rows, difference_rows
+
+    settings = _settings(flags["config_path"], flags["words"], None)
+    names = _names(runs)
+    data = compare_runs([load_seeds(run, settings, truth) for run in runs], names, settings, seed=flags["seed"])
+    if as_json:
+        numbers = {c.name: {k: v.value for k, v in c.metrics.items()} for c in data.contenders}
+        common.emit({"runs": numbers, "differences": [{"a": a, "b": b, **asdict(d)} for a, b, d in data.differences]})
+    else:
+        rows = [[row.key, *(f"{c.text}{' *' if c.is_best else ''}" for c in row.cells)] for row in compare_rows(data)]
+        click.echo(common.table(["metric (* best)", *names], rows, right=tuple(range(1, len(names) + 1))))
+        for key, what, how_sure in difference_rows(data):
+            click.echo(f"{key}: {what} [{how_sure}]")
+        click.echo(data.verdict)
+    if out is not None:
+        write_compare_report(out, data)
+        click.echo(f"report   {out}", err=as_json)
+
+
+@click.command()
+@RUNS
+@truth_option
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path), metavar="FILE.html", help="Default: report.html in the run."
+)
+@common.config_option
+@common.set_option
+@common.seed_option
+def report(runs: tuple[Path, ...], truth: Path | None, out: Path | None, **flags: Any) -> None:
+    """Draw the page of a run again, or one page of several.
+
+    \b
+    Examples:
+      wallkit report log.wallkit --truth mocap.tum -o with-truth.html
+      wallkit report a/ b/ --out report.html
+    """
+    from wallkit.pipelines.report import compare_runs, write_compare_report, write_run_report
+
+    settings = _settings(flags["config_path"], flags["words"], None)
+    if len(runs) == 1:
+        record, evaluation = load_seeds(runs[0], settings, truth)[0]
+        out = out or runs[0] / "report.html"
+        write_run_report(out, record, evaluation, settings)
+    else:
+        if out is None:
+            raise click.UsageError("several runs make a page of their own: say where with --out report.html")
+        loaded = [load_seeds(run, settings, truth) for run in runs]
+        write_compare_report(out, compare_runs(loaded, _names(runs), settings, seed=flags["seed"]))
+    click.echo(f"report   {out}")
+
+
+def load_seeds(folder: Path, settings: EvaluateSettings, truth: Path | None) -> list[tuple[RunRecord, Evaluation]]:
+    """The runs in a result folder, judged: one, or one per seed."""
+    from dataclasses import replace
+
+    from wallkit.evaluate.tum import read_tum
+    from wallkit.pipelines.evaluate import evaluate_steps
+    from wallkit.pipelines.run_folder import read_run
+
+    folders = sorted(folder.glob("seed-*"), key=lambda path: int(path.name.removeprefix("seed-"))) or [folder]
+    known = None if truth is None else read_tum(truth)
+    found = []
+    for one in folders:
+        record = read_run(one)
+        record = record if known is None else replace(record, truth=known)
+        found.append((record, evaluate_steps(record.steps, record.truth, settings)))
+    return found
+
+
+def _settings(config_path: Path | None, words: tuple[str, ...], offset_s: float | None) -> EvaluateSettings:
+    from wallkit.pipelines.config import load_config
+
+    flags = {"evaluate.truth_offset_s": (offset_s, "--t-offset")}
+    return load_config(config_path, words, flags).config.evaluate
+
+
+def _document(found: list[tuple[RunRecord, Evaluation]]) -> dict[str, Any]:
+    from wallkit.pipelines.seeds import summary_document
+
+    if len(found) > 1:
+        return summary_document(found)
+    record, evaluation = found[0]
+    numbers = {**evaluation.metrics, **record.resources}
+    metrics = {key: value.value for key, value in numbers.items()}
+    return {"health": record.answer["health"], "seed": record.run["seed"], "metrics": metrics}
+
+
+def _table(found: list[tuple[RunRecord, Evaluation]]) -> str:
+    from wallkit.evaluate.statistics import summarise
+    from wallkit.report.wording import spread_text, value_text
+
+    if len(found) == 1:
+        record, evaluation = found[0]
+        values = {**evaluation.metrics, **record.resources}.values()
+        return common.table(
+            ["metric", "value", "definition"], [[v.key, value_text(v), v.definition] for v in values], right=(1,)
+        )
+    spreads = summarise([{**evaluation.metrics, **record.resources} for record, evaluation in found])
+    rows = [[key, spread_text(spread)] for key, spread in spreads.items()]
+    return common.table(["metric", f"over {len(found)} runs"], rows)
+
+
+def _ate_of(record: RunRecord, evaluation: Evaluation) -> float:
+    from wallkit.errors import WallkitError
+
+    value = evaluation.metrics.get("ate_rmse_m")
+    if value is None or value.value is None:
+        raise WallkitError("has no truth to hold against --max-ate-m", where=record.name, hint="--truth FILE.tum")
+    return value.value
+
+
+def _write_evo(out: Path | None, found: list[tuple[RunRecord, Evaluation]]) -> None:
+    from wallkit.errors import WallkitError
+    from wallkit.evaluate.evo import write_evo_zip
+    from wallkit.evaluate.metrics import SERIES
+
+    if out is None:
+        raise click.UsageError("say where the zips go: --out FOLDER")
+    out.mkdir(parents=True, exist_ok=True)
+    for record, evaluation in found:
+        if evaluation.pairs is None:
+            raise WallkitError(
+                "has no truth, so there is no error to export", where=record.name, hint="--truth FILE.tum"
+            )
+        for name in SERIES:
+            if SERIES[name](evaluation.pairs) is not None:
+                seed = f"-seed-{record.run['seed']}" if len(found) > 1 else ""
+                write_evo_zip(out / f"{name}{seed}.zip", evaluation.pairs, name)
+    click.echo(f"evo      {out}")
+
+
+def _names(runs: tuple[Path, ...]) -> list[str]:
+    """Short names that tell the runs apart."""
+    short = [run.resolve().name for run in runs]
+    return short if len(set(short)) == len(short) else [str(run) for run in runs]

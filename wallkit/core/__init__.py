@@ -1,0 +1,1 @@
+"""Nouns and mathematics that every room speaks."""

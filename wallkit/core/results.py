@@ -1,0 +1,115 @@
+"""The nouns that judge a run: limits, errors, episodes, numbers and their spread."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from wallkit.core.types import Float64Array, Int64Array
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What right, wrong and good enough mean, for every verdict and every line in a figure."""
+
+    converged_m: float = 0.5
+    converged_deg: float = 10.0
+    lost_m: float = 1.0
+    lost_deg: float = 30.0
+    available_m: float = 0.3
+    available_deg: float = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """How far the estimate is from the truth at each scan that has a truth.
+
+    Attributes:
+        stamps_ns: (E,) int64. rows: (E,) int64, the rows of the estimate that could be compared.
+        position_m, heading_deg: (E,) float64, not negative.
+    """
+
+    stamps_ns: Int64Array
+    rows: Int64Array
+    position_m: Float64Array
+    heading_deg: Float64Array
+
+    def __len__(self) -> int:
+        return len(self.stamps_ns)
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """One number of a run: its key, value (None: does not exist for this run), unit and definition in one line."""
+
+    key: str
+    value: float | None
+    unit: str
+    definition: str
+    better: Literal["lower", "higher", ""] = "lower"
+
+
+@dataclass(frozen=True, slots=True)
+class Episode:
+    """A stretch of wrong estimates, and when the filter noticed. Stamps in ns; None: it did not happen.
+
+    Attributes:
+        start_ns: first scan that is lost by `Limits`.
+        recovered_ns: first scan after it that is converged by `Limits`; the episode's end.
+        unhealthy_ns: when the health left LOCALIZED; before start_ns when the filter doubted in time.
+        said_lost_ns: when LOST was said.
+        updates_to_lost: updates of the filter from start_ns, not counted, to said_lost_ns; 0 or less: in time.
+        healthy_again_ns: first LOCALIZED after the recovery.
+        worst_m, worst_deg: largest errors inside.
+        false_healthy: scans inside that are lost by `Limits` and called LOCALIZED.
+    """
+
+    start_ns: int
+    recovered_ns: int | None
+    unhealthy_ns: int | None
+    said_lost_ns: int | None
+    updates_to_lost: int | None
+    healthy_again_ns: int | None
+    worst_m: float
+    worst_deg: float
+    false_healthy: int
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """One metric over several runs.
+
+    Attributes:
+        mean, sd: over the runs that have the number; sd divides by n - 1 and is None for a single one.
+        worst: None also when a run lacks the number: a run that never converged must not make the worst look good.
+        runs, missing: how many runs there are, and how many lack the number.
+    """
+
+    key: str
+    unit: str
+    mean: float | None
+    sd: float | None
+    worst: float | None
+    runs: int
+    missing: int
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """How much b differs from a.
+
+    Attributes:
+        difference: mean of b - a. low, high: its 95 % interval.
+        p_value: chance of a difference this large if there were none; two-sided.
+        pairs: how many pairs it rests on. method: the test, in words.
+    """
+
+    key: str
+    unit: str
+    difference: float
+    low: float
+    high: float
+    p_value: float
+    pairs: int
+    method: str
+    better: Literal["a", "b", "neither"]

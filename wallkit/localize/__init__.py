@@ -1,0 +1,1 @@
+"""Odometry and labelled scans -> a belief over poses, an estimate, and how far to trust it."""

@@ -1,0 +1,192 @@
+"""Odometry and labelled scans -> a belief and an estimate: Monte Carlo localization on one screen.
+
+`predict` and `update` are apart because point filters look at the predicted pose before they weigh the scan.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wallkit.core.geometry import compose, relative
+from wallkit.core.raycast import classify_rays
+from wallkit.core.types import FieldSet, Float64Array, Health, Int8Array, LabelledScan, Mode, StampedPose
+from wallkit.localize.belief import Belief, StepInfo
+from wallkit.localize.estimate import ESTIMATORS, find_modes, near_pose
+from wallkit.localize.health import Trust, count_updates, has_outlived, is_ripe, judge, speaks_against, weigh_evidence
+from wallkit.localize.initial import SPREADS, START_SD, around_pose
+from wallkit.localize.particles import Particles, effective_size, equally_weighted, normalised
+from wallkit.localize.recovery import BoundRecovery, Memory, Situation, moved_places
+from wallkit.localize.resample import RESAMPLERS, kld_size, roughened
+from wallkit.localize.sensor import Likelihood
+from wallkit.localize.settings import LocalizeSettings
+
+_STILL = np.zeros(3)
+# a spread below this is finer than the map: half a cell and a tenth of a degree
+_SD_FLOOR = (0.01, 0.01, np.deg2rad(0.1))
+
+
+@dataclass(frozen=True)
+class MonteCarloLocalizer:
+    """The particle filter on one map; made by `monte_carlo_localizer`."""
+
+    settings: LocalizeSettings
+    fields: FieldSet
+    likelihood: Likelihood
+    recovery: BoundRecovery
+
+    def start(self, rng: np.random.Generator, at: StampedPose | str) -> Belief:
+        """A belief about a given pose, or spread as `global` or `everywhere` say."""
+        n = self.settings.particles
+        poses = around_pose(rng, at, n) if isinstance(at, StampedPose) else SPREADS[at](rng, self.fields, n)
+        particles = equally_weighted(poses)
+        pose, covariance, modes = self._answer(particles)
+        trust = (
+            Trust(Health.UNCERTAIN, "a start pose was given", is_confirmed=True)
+            if isinstance(at, StampedPose)
+            else Trust()
+        )
+        return Belief(particles, None, _STILL, True, pose, covariance, modes, trust, Memory())
+
+    def predict(self, rng: np.random.Generator, belief: Belief, odometry: Float64Array, gap_s: float = 0.0) -> Belief:
+        """The belief after odometry (3,) = T_odom_base: particles move once there is enough motion for an update."""
+        gap = max(belief.gap_s, gap_s)
+        if belief.odometry is None:
+            return replace(belief, odometry=odometry, gap_s=gap)
+        moved = relative(belief.odometry, odometry)
+        belief = replace(belief, pending=moved, is_due=belief.updates == 0, gap_s=gap)
+        s = self.settings
+        if np.hypot(moved[0], moved[1]) < s.update_distance_m and abs(moved[2]) < np.deg2rad(s.update_turn_deg):
+            return belief
+        return self._moved(rng, belief)
+
+    def update(self, rng: np.random.Generator, belief: Belief, scan: LabelledScan) -> tuple[Belief, StepInfo]:
+        """The belief after a scan, and what the update did; without enough motion the belief as it was."""
+        s = self.settings
+        if not belief.is_due:
+            if not self._contradicts(belief, scan):
+                return belief, StepInfo(False, belief.trust.reason, particles=len(belief.particles))
+            # odometry says the robot stood still, the scan says it did not: it was carried, turned, or hit
+            belief = self._moved(rng, belief)
+        # a map that is a little wrong in one place must not kill the right one of several hypotheses
+        exponent = 1.0 if belief.trust.is_confirmed else s.caution
+        log_p = self.likelihood.log_likelihood(belief.particles.poses, scan)
+        particles = Particles(belief.particles.poses, belief.particles.log_weights + exponent * log_p)
+        weights = normalised(particles.log_weights)
+        pose, covariance, modes = self._answer(particles)
+        evidence = weigh_evidence(self._rays_at(scan, pose), np.sqrt(np.diag(covariance)), modes)
+        trust = count_updates(
+            s.health,
+            belief.trust,
+            evidence,
+            path_m=belief.path_m,
+            gap_s=belief.gap_s,
+            has_jumped=belief.updates > 0 and not near_pose(pose[None], belief.pose)[0],
+        )
+        assert belief.odometry is not None  # predict() comes first
+        outcome = self.recovery.recover(
+            rng,
+            self._resampled(rng, particles, weights, belief.updates),
+            belief.memory,
+            Situation(
+                points=scan.points,
+                odometry=belief.odometry,
+                estimate=pose,
+                fit=evidence.hit,
+                is_confirmed=trust.is_confirmed,
+                was_confirmed=belief.trust.is_confirmed,
+                is_ripe=is_ripe(s.health, trust, evidence),
+                is_fitting=trust.good >= 2,
+            ),
+        )
+        confirmed = trust.is_confirmed or outcome.confirms or has_outlived(s.health, trust, evidence)
+        trust = judge(s.health, replace(trust, is_confirmed=confirmed), evidence)
+        info = StepInfo(True, trust.reason, evidence, effective_size(weights), len(outcome.particles), outcome.injected)
+        after = Belief(
+            particles=outcome.particles,
+            odometry=belief.odometry,
+            pending=_STILL,
+            is_due=False,
+            pose=pose,
+            covariance=covariance,
+            modes=modes,
+            trust=trust,
+            memory=outcome.memory,
+            updates=belief.updates + 1,
+        )
+        return after, info
+
+    def candidates(self, belief: Belief) -> tuple[Mode, ...]:
+        """Every place the robot may be: the belief's modes, and unless LOCALIZED whatever else explains the last views."""
+        here = belief.estimate().modes
+        if belief.trust.health is Health.LOCALIZED or belief.odometry is None:
+            return here
+        places = self.recovery.candidates(belief.memory, compose(belief.odometry, belief.pending))
+        covariance = np.diag(np.square(START_SD))
+        known = np.array([mode.pose for mode in here])
+        others = [place for place in places if not near_pose(known, place.pose).any()]
+        return (*here, *(Mode(place.pose, covariance, 0.0) for place in others))
+
+    def _moved(self, rng: np.random.Generator, belief: Belief) -> Belief:
+        """The belief with its pending motion applied to the particles, due for an update."""
+        assert belief.odometry is not None  # predict() comes first
+        moved = belief.pending
+        return replace(
+            belief,
+            particles=Particles(
+                self.settings.motion.sample(rng, belief.particles.poses, moved), belief.particles.log_weights
+            ),
+            odometry=compose(belief.odometry, moved),
+            pending=_STILL,
+            is_due=True,
+            path_m=float(np.hypot(moved[0], moved[1])),
+            pose=compose(belief.pose, moved),
+            modes=tuple(replace(mode, pose=compose(mode.pose, moved)) for mode in belief.modes),
+            memory=replace(belief.memory, places=moved_places(belief.memory.places, moved)),
+        )
+
+    def _contradicts(self, belief: Belief, scan: LabelledScan) -> bool:
+        """Whether a scan taken between two updates speaks against the estimate carried on by odometry."""
+        rays = self._rays_at(scan, compose(belief.pose, belief.pending))
+        evidence = weigh_evidence(rays, np.sqrt(np.diag(belief.covariance)), belief.modes)
+        return speaks_against(self.settings.health, belief.trust, evidence)
+
+    def _rays_at(self, scan: LabelledScan, pose: Float64Array) -> Int8Array:
+        h = self.settings.health
+        return classify_rays(
+            self.fields, scan.points, pose, tolerance_m=h.hit_tolerance_m, tolerance_per_m=h.hit_tolerance_per_m
+        )
+
+    def _answer(self, particles: Particles) -> tuple[Float64Array, Float64Array, tuple[Mode, ...]]:
+        weights = normalised(particles.log_weights)
+        modes = find_modes(particles.poses, weights)
+        pose, covariance = ESTIMATORS[self.settings.estimator](particles.poses, weights, modes)
+        return pose, covariance + np.diag(np.square(_SD_FLOOR)), modes
+
+    def _resampled(
+        self, rng: np.random.Generator, particles: Particles, weights: Float64Array, updates: int
+    ) -> Particles:
+        s = self.settings
+        needed = {
+            "ess": effective_size(weights) < s.resample_below * len(particles),
+            "always": True,
+            "every": (updates + 1) % s.resample_every == 0,
+        }[s.resample_when]
+        if not needed:
+            return particles
+        n = kld_size(rng, particles.poses, weights, s) if s.count == "kld" else s.particles
+        poses = particles.poses[RESAMPLERS[s.resampler](rng, weights, n)]
+        if s.roughen_sd_m > 0 or s.roughen_sd_deg > 0:
+            poses = roughened(rng, poses, s.roughen_sd_m, np.deg2rad(s.roughen_sd_deg))
+        return equally_weighted(poses)
+
+
+def monte_carlo_localizer(settings: LocalizeSettings, fields: FieldSet) -> MonteCarloLocalizer:
+    """The filter for one map, its look-up tables prepared."""
+    return MonteCarloLocalizer(
+        settings,
+        fields,
+        settings.sensor.on(fields, threads=settings.threads),
+        settings.recovery.on(fields),
+    )

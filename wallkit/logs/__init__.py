@@ -1,0 +1,1 @@
+"""Recordings in any common format -> decoded messages -> frames for the filter; results -> MCAP."""

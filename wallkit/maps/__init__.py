@@ -1,0 +1,1 @@
+"""Maps of walls -> occupancy and distance fields; later: authoring and validation."""

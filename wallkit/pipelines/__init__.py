@@ -1,0 +1,1 @@
+"""Where rooms meet: typed settings in, result dataclasses out, nothing printed."""

@@ -1,0 +1,80 @@
+"""wallkit.toml, --set words and flags -> the settings of every room."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from wallkit.core.config import Source, build, read_toml, section, setting, source_from_words
+from wallkit.localize.settings import LocalizeSettings
+from wallkit.logs.sync import SyncConfig
+from wallkit.maps.fields import MapsSettings
+from wallkit.pipelines.evaluate import EvaluateSettings
+from wallkit.pipelines.recorder import ResultSettings
+from wallkit.points.filters import PointsSettings
+
+DEFAULT_FILE = Path("wallkit.toml")
+
+
+@dataclass(frozen=True)
+class Config:
+    """One table per room; `wallkit config show` prints it."""
+
+    map: str = setting("", "map used when --map is not given; relative to this file")
+    logs: SyncConfig = section(SyncConfig, "how messages become frames")
+    maps: MapsSettings = section(MapsSettings, "how maps become fields")
+    points: PointsSettings = section(PointsSettings, "which returns are trusted")
+    localize: LocalizeSettings = section(LocalizeSettings, "the filter")
+    evaluate: EvaluateSettings = section(EvaluateSettings, "when an estimate is right or wrong")
+    results: ResultSettings = section(ResultSettings, "what is written")
+
+
+@dataclass(frozen=True)
+class LoadedConfig:
+    """The settings, where each came from, and the file they were read from."""
+
+    config: Config
+    origins: dict[str, str]
+    path: Path | None
+
+
+def load_config(path: Path | None, words: Sequence[str] = (), flags: dict[str, Any] | None = None) -> LoadedConfig:
+    """Settings from a file (or ./wallkit.toml if there is one), then --set words, then flags.
+
+    Args:
+        flags: dotted key -> (value, name of the flag); None values are flags not given.
+
+    Raises:
+        ConfigError: see core.config.
+    """
+    if path is None and DEFAULT_FILE.is_file():
+        path = DEFAULT_FILE
+    sources: list[Source] = []
+    if path is not None:
+        sources.append(_with_map_beside(read_toml(path), path))
+    sources.append(source_from_words(words))
+    for key, (value, flag) in (flags or {}).items():
+        if value is not None:
+            sources.append(_source_of_flag(key, value, flag))
+    config, origins = build(Config, sources)
+    return LoadedConfig(config, origins, path)
+
+
+def _with_map_beside(source: Source, path: Path) -> Source:
+    """The source with its map named from here, not from the file's folder."""
+    name = source.table.get("map")
+    if not isinstance(name, str) or not name or Path(name).is_absolute():
+        return source
+    return replace(source, table={**source.table, "map": str(path.parent / name)})
+
+
+def _source_of_flag(key: str, value: Any, flag: str) -> Source:
+    table: dict[str, Any] = {}
+    inner = table
+    *parents, last = key.split(".")
+    for parent in parents:
+        inner = inner.setdefault(parent, {})
+    inner[last] = value
+    return Source(table, flag)

@@ -1,0 +1,237 @@
+"""A recorded log and a map -> where the robot was, how far to trust it, and a folder that says so.
+
+The whole run reads top to bottom in `localize`; start here to find your way in the code.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wallkit.core.geometry import interpolate_poses
+from wallkit.core.steps import Steps
+from wallkit.core.types import Estimate, Float64Array, LabelledScan, StampedPose, Trajectory
+from wallkit.errors import ConfigError, LogError
+from wallkit.evaluate.resources import Mark, Timers, mark_now
+from wallkit.evaluate.tum import read_tum
+from wallkit.localize.ekf import ScanMatchingEkf, scan_matching_ekf
+from wallkit.localize.filter import MonteCarloLocalizer, monte_carlo_localizer
+from wallkit.localize.initial import SPREADS
+from wallkit.logs.loss import Loss
+from wallkit.logs.reader import Log, open_log
+from wallkit.logs.results import ResultWriter
+from wallkit.logs.rig import Rig, Wanted, find_rig
+from wallkit.logs.sync import SyncReport, synchronise
+from wallkit.logs.topics import pick_initial_pose, pick_truth
+from wallkit.logs.trajectories import first_pose, trajectory_of
+from wallkit.pipelines.config import Config
+from wallkit.pipelines.maps import LoadedMap, load_map
+from wallkit.pipelines.recorder import MessageWriter, Recorder
+from wallkit.points.filters import apply_filters
+from wallkit.report.data import Snapshot
+
+
+@dataclass(frozen=True)
+class Request:
+    """What the user asked for.
+
+    Attributes:
+        logs: files and folders of one recording. map: None takes the log's own.
+        init: "X,Y,YAW", "topic", "truth", "global", "everywhere"; None: topic when there is one, else global.
+        truth: a topic, "map->base_link", a TUM file, or None for what the log calls its truth.
+        start_s, end_s: seconds from the first scan; None for all.
+        wanted: topics and frames named by the user.
+    """
+
+    logs: tuple[Path, ...]
+    map: Path | None = None
+    init: str | None = None
+    truth: str | None = None
+    seed: int = 0
+    start_s: float | None = None
+    end_s: float | None = None
+    wanted: Wanted = field(default_factory=Wanted)
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """Everything found and checked before the first scan is looked at."""
+
+    request: Request
+    config: Config
+    log: Log
+    rig: Rig
+    map: LoadedMap
+    truth: Trajectory | None
+    start: StampedPose | str
+    window_ns: tuple[int | None, int | None]
+
+
+@dataclass(frozen=True)
+class Run:
+    """What came out.
+
+    Attributes:
+        steps: one row per scan.
+        estimate: the last one; its modes are every place the robot may be then.
+        odometry: at every scan. snapshots: particles at a few moments.
+        sync, loss: what was dropped on the way. timers: seconds by phase. mark: when the run began.
+    """
+
+    prepared: Prepared
+    steps: Steps
+    estimate: Estimate
+    odometry: Trajectory
+    snapshots: tuple[Snapshot, ...]
+    sync: SyncReport
+    loss: Loss
+    timers: Timers
+    mark: Mark
+
+
+Observer = Callable[[int], None]
+
+# how well a start pose taken from truth is known: as well as the truth itself
+TRUTH_SD = (0.1, 0.1, np.deg2rad(3.0))
+
+
+def prepare(request: Request, config: Config) -> Prepared:
+    """Open the log and the map, and find what is needed in them.
+
+    Raises:
+        WallkitError: something is missing; nothing has been computed or written yet.
+    """
+    log = open_log(request.logs)
+    rig = find_rig(log, request.wanted)
+    map_path = request.map or (Path(config.map) if config.map else None)
+    loaded = load_map(map_path, log, config.maps)
+    truth = _find_truth(log, request.truth)
+    window = _window_ns(log, rig, request)
+    start = _find_start(log, request, truth, rig, window)
+    return Prepared(request, config, log, rig, loaded, truth, start, window)
+
+
+def localize(
+    prepared: Prepared, *, result_mcap: Path | None = None, observe: Observer | None = None, mark: Mark | None = None
+) -> Run:
+    """Run the filter over the whole log.
+
+    Args:
+        result_mcap: where to write every step as messages; None does not.
+        observe: called with the number of scans done after each.
+        mark: when the run began, for its times.
+    """
+    p, timers, mark = prepared, Timers(), mark or mark_now()
+    with timers.phase("prepare"):
+        tracker, filters = _tracker(p), p.config.points.on(p.map.fields)
+    rng = np.random.default_rng(np.random.SeedSequence(p.request.seed))
+    belief: Any = tracker.start(rng, p.start)  # type: ignore[arg-type]  # _tracker refuses a spread for the EKF
+    sync, recorder = SyncReport(), Recorder()
+    frames = synchronise(p.log, p.rig, p.config.logs, report=sync, start_ns=p.window_ns[0], end_ns=p.window_ns[1])
+    with _message_writer(p, result_mcap) as messages:
+        for frame in timers.each("read", frames):
+            with timers.phase("filter"):
+                began = time.perf_counter_ns()
+                belief = tracker.predict(rng, belief, frame.odometry, frame.odometry_gap_s)
+                scan = LabelledScan(frame.points, np.ones(len(frame.points.ranges_m), dtype=np.float32))
+                scan = apply_filters(filters, scan, belief.estimate())
+                belief, info = tracker.update(rng, belief, scan)
+                elapsed_ms = (time.perf_counter_ns() - began) / 1e6
+            estimate = belief.estimate(frame.stamp_ns)
+            recorder.add(frame, estimate, info, belief, elapsed_ms)
+            if messages:
+                with timers.phase("write"):
+                    messages.add(frame, estimate, info, belief)
+            if observe:
+                observe(len(recorder))
+    final = replace(estimate, modes=tracker.candidates(belief))
+    return Run(
+        p, recorder.steps(), final, recorder.odometry(), tuple(recorder.snapshots), sync, p.log.loss, timers, mark
+    )
+
+
+def _tracker(p: Prepared) -> MonteCarloLocalizer | ScanMatchingEkf:
+    if p.config.localize.tracker == "particle_filter":
+        return monte_carlo_localizer(p.config.localize, p.map.fields)
+    if isinstance(p.start, str):
+        raise ConfigError(
+            "the Kalman filter cannot start without a pose", where="--init", hint="--init X,Y,YAW, or truth"
+        )
+    return scan_matching_ekf(p.config.localize, p.map.fields)
+
+
+@contextmanager
+def _message_writer(p: Prepared, path: Path | None) -> Iterator[MessageWriter | None]:
+    if path is None:
+        yield None
+        return
+    with ResultWriter(path, base=p.rig.base_frame) as writer:
+        yield MessageWriter(writer, p.config.results, p.map.grid, p.truth)
+
+
+def _find_truth(log: Log, name: str | None) -> Trajectory | None:
+    if name is not None and name.endswith(".tum"):
+        return read_tum(Path(name))
+    track = pick_truth(log, name)
+    return None if track is None else trajectory_of(log, track)
+
+
+def _window_ns(log: Log, rig: Rig, request: Request) -> tuple[int | None, int | None]:
+    """Header stamps between which scans are used."""
+    if request.start_s is None and request.end_s is None:
+        return None, None
+    first = log.first(rig.scan.topic)[0].stamp_ns
+    return tuple(None if s is None else first + round(s * 1e9) for s in (request.start_s, request.end_s))  # type: ignore[return-value]
+
+
+def _find_start(
+    log: Log, request: Request, truth: Trajectory | None, rig: Rig, window_ns: tuple[int | None, int | None]
+) -> StampedPose | str:
+    """The start as a pose, or the name of a spread over the map."""
+    init = request.init
+    if init in SPREADS:
+        return init
+    if init == "truth":
+        return _start_from_truth(log, truth, rig, window_ns)
+    if init is None or init == "topic":
+        channel = pick_initial_pose(log)
+        if channel is not None:
+            return first_pose(log, channel)
+        if init == "topic":
+            raise LogError("no initial pose topic", where=log.name, hint="--init X,Y,YAW, or global")
+        return "global"
+    return StampedPose(0, "map", _pose_from_words(init))
+
+
+def _start_from_truth(
+    log: Log, truth: Trajectory | None, rig: Rig, window_ns: tuple[int | None, int | None]
+) -> StampedPose:
+    if truth is None:
+        raise LogError(
+            "--init truth needs a truth, and the log has none", where=log.name, hint="--truth TOPIC or FILE.tum"
+        )
+    stamp_ns = window_ns[0] if window_ns[0] is not None else log.first(rig.scan.topic)[0].stamp_ns
+    if not truth.stamps_ns[0] - 10**9 <= stamp_ns <= truth.stamps_ns[-1]:
+        raise LogError("the truth does not reach the first scan", where=log.name, hint="start later with --start")
+    pose = interpolate_poses(truth.stamps_ns, truth.poses, [stamp_ns])[0]
+    return StampedPose(stamp_ns, "map", pose, np.diag(np.square(TRUTH_SD)))
+
+
+def _pose_from_words(words: str) -> Float64Array:
+    parts = words.split(",")
+    try:
+        pose = np.array([float(part) for part in parts])
+    except ValueError:
+        pose = np.zeros(0)
+    if pose.shape != (3,) or not np.isfinite(pose).all():
+        names = ", ".join(["topic", "truth", *SPREADS])
+        raise ConfigError(
+            f"'{words}' is no start", where="--init", hint=f"X,Y,YAW in metres and radians, or one of {names}"
+        )
+    return pose

@@ -1,0 +1,1 @@
+"""Package data: a small log with its map and truth, made by `python -m wallkit.pipelines.sample`."""
