@@ -78,8 +78,9 @@ def _signed_rank_p(differences: Float64Array) -> float:
     if not differences.any():
         return 1.0
     # up to 13 pairs all 2^n sign patterns are tried, which stays exact when differences are tied or zero
-    method = stats.PermutationMethod(n_resamples=9999) if len(differences) <= 13 else "auto"
-    return float(stats.wilcoxon(differences, method=method).pvalue)
+    if len(differences) <= 13:
+        return float(stats.wilcoxon(differences, method=stats.PermutationMethod(n_resamples=9999)).pvalue)
+    return float(stats.wilcoxon(differences, method="auto").pvalue)
 
 
 def _block_means(values: Float64Array, block: int) -> Float64Array:

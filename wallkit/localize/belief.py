@@ -12,6 +12,17 @@ from wallkit.localize.recovery import Memory
 
 
 @dataclass(frozen=True, slots=True)
+class Answer:
+    """What weighted particles say: pose (3,), covariance (3, 3), every hypothesis, and how well the scan fits there."""
+
+    particles: Particles
+    pose: Float64Array
+    covariance: Float64Array
+    modes: tuple[Mode, ...]
+    evidence: Evidence
+
+
+@dataclass(frozen=True, slots=True)
 class Belief:
     """Everything the filter knows between two frames.
 

@@ -12,15 +12,25 @@ import numpy as np
 from wallkit.core.geometry import compose, relative
 from wallkit.core.raycast import classify_rays
 from wallkit.core.types import FieldSet, Float64Array, Health, Int8Array, LabelledScan, Mode, StampedPose
-from wallkit.localize.belief import Belief, StepInfo
+from wallkit.localize.belief import Answer, Belief, StepInfo
 from wallkit.localize.estimate import ESTIMATORS, find_modes, near_pose
-from wallkit.localize.health import Trust, count_updates, has_outlived, is_ripe, judge, speaks_against, weigh_evidence
+from wallkit.localize.health import (
+    Trust,
+    count_updates,
+    has_outlived,
+    is_ripe,
+    judge,
+    speaks_against,
+    speaks_for,
+    weigh_evidence,
+)
 from wallkit.localize.initial import SPREADS, START_SD, around_pose
 from wallkit.localize.particles import Particles, effective_size, equally_weighted, normalised
 from wallkit.localize.recovery import BoundRecovery, Memory, Situation, moved_places
 from wallkit.localize.resample import RESAMPLERS, kld_size, roughened
 from wallkit.localize.sensor import Likelihood
 from wallkit.localize.settings import LocalizeSettings
+from wallkit.localize.slip import describe_slip, look_around
 
 _STILL = np.zeros(3)
 # a spread below this is finer than the map: half a cell and a tenth of a degree
@@ -69,30 +79,29 @@ class MonteCarloLocalizer:
                 return belief, StepInfo(False, belief.trust.reason, particles=len(belief.particles))
             # odometry says the robot stood still, the scan says it did not: it was carried, turned, or hit
             belief = self._moved(rng, belief)
-        # a map that is a little wrong in one place must not kill the right one of several hypotheses
-        exponent = 1.0 if belief.trust.is_confirmed else s.caution
-        log_p = self.likelihood.log_likelihood(belief.particles.poses, scan)
-        particles = Particles(belief.particles.poses, belief.particles.log_weights + exponent * log_p)
-        weights = normalised(particles.log_weights)
-        pose, covariance, modes = self._answer(particles)
-        evidence = weigh_evidence(self._rays_at(scan, pose), np.sqrt(np.diag(covariance)), modes)
+        answer = self._judged(self._weighed(belief, scan), scan)
+        if self._is_worth_a_look(belief, answer):
+            near_by = self._judged(look_around(s.slip, rng, belief.particles, self.likelihood, scan), scan)
+            if speaks_for(s.health, belief.trust, near_by.evidence) and near_by.evidence.hit > answer.evidence.hit:
+                answer = near_by
+        evidence, off = answer.evidence, relative(belief.pose, answer.pose) if belief.updates > 0 else _STILL
         trust = count_updates(
             s.health,
             belief.trust,
             evidence,
             path_m=belief.path_m,
             gap_s=belief.gap_s,
-            has_jumped=belief.updates > 0 and not near_pose(pose[None], belief.pose)[0],
+            has_jumped=s.slip.is_jump(off),
         )
         assert belief.odometry is not None  # predict() comes first
         outcome = self.recovery.recover(
             rng,
-            self._resampled(rng, particles, weights, belief.updates),
+            self._resampled(rng, answer.particles, belief.updates),
             belief.memory,
             Situation(
                 points=scan.points,
                 odometry=belief.odometry,
-                estimate=pose,
+                estimate=answer.pose,
                 fit=evidence.hit,
                 is_confirmed=trust.is_confirmed,
                 was_confirmed=belief.trust.is_confirmed,
@@ -101,16 +110,18 @@ class MonteCarloLocalizer:
             ),
         )
         confirmed = trust.is_confirmed or outcome.confirms or has_outlived(s.health, trust, evidence)
-        trust = judge(s.health, replace(trust, is_confirmed=confirmed), evidence)
-        info = StepInfo(True, trust.reason, evidence, effective_size(weights), len(outcome.particles), outcome.injected)
+        slip = describe_slip(off) if s.slip.is_slip(off) else ""
+        trust = judge(s.health, replace(trust, is_confirmed=confirmed), evidence, slip=slip)
+        effective = effective_size(normalised(answer.particles.log_weights))
+        info = StepInfo(True, trust.reason, evidence, effective, len(outcome.particles), outcome.injected)
         after = Belief(
             particles=outcome.particles,
             odometry=belief.odometry,
             pending=_STILL,
             is_due=False,
-            pose=pose,
-            covariance=covariance,
-            modes=modes,
+            pose=answer.pose,
+            covariance=answer.covariance,
+            modes=answer.modes,
             trust=trust,
             memory=outcome.memory,
             updates=belief.updates + 1,
@@ -127,6 +138,13 @@ class MonteCarloLocalizer:
         known = np.array([mode.pose for mode in here])
         others = [place for place in places if not near_pose(known, place.pose).any()]
         return (*here, *(Mode(place.pose, covariance, 0.0) for place in others))
+
+    def _weighed(self, belief: Belief, scan: LabelledScan) -> Particles:
+        """The particles with the scan counted in."""
+        # a map that is a little wrong in one place must not kill the right one of several hypotheses
+        exponent = 1.0 if belief.trust.is_confirmed else self.settings.caution
+        log_p = self.likelihood.log_likelihood(belief.particles.poses, scan)
+        return Particles(belief.particles.poses, belief.particles.log_weights + exponent * log_p)
 
     def _moved(self, rng: np.random.Generator, belief: Belief) -> Belief:
         """The belief with its pending motion applied to the particles, due for an update."""
@@ -164,10 +182,22 @@ class MonteCarloLocalizer:
         pose, covariance = ESTIMATORS[self.settings.estimator](particles.poses, weights, modes)
         return pose, covariance + np.diag(np.square(_SD_FLOOR)), modes
 
-    def _resampled(
-        self, rng: np.random.Generator, particles: Particles, weights: Float64Array, updates: int
-    ) -> Particles:
-        s = self.settings
+    def _judged(self, particles: Particles, scan: LabelledScan) -> Answer:
+        """What the particles answer, and what the scan says about it."""
+        pose, covariance, modes = self._answer(particles)
+        evidence = weigh_evidence(self._rays_at(scan, pose), np.sqrt(np.diag(covariance)), modes)
+        return Answer(particles, pose, covariance, modes, evidence)
+
+    def _is_worth_a_look(self, belief: Belief, answer: Answer) -> bool:
+        """Whether a trusted estimate suddenly fits worse than is usual here: the odometry may have slipped."""
+        trust, evidence = belief.trust, answer.evidence
+        if not trust.is_confirmed or belief.updates == 0 or self.settings.slip.reach_m == 0:
+            return False
+        fits_less = evidence.hit < self.settings.slip.hits_of_usual * trust.usual_hits
+        return fits_less or not speaks_for(self.settings.health, trust, evidence)
+
+    def _resampled(self, rng: np.random.Generator, particles: Particles, updates: int) -> Particles:
+        s, weights = self.settings, normalised(particles.log_weights)
         needed = {
             "ess": effective_size(weights) < s.resample_below * len(particles),
             "always": True,

@@ -85,6 +85,7 @@ class Trust:
         good, bad, doubtful: updates in a row for it, against it, and not for it.
         good_path_m: path driven during the updates in a row for it.
         usual: running mean of hit / (hit + long) while LOCALIZED: how good this map is where the robot is; 0 before.
+        usual_hits: the same of the share of hits.
     """
 
     health: Health = Health.LOST
@@ -95,6 +96,7 @@ class Trust:
     doubtful: int = 0
     good_path_m: float = 0.0
     usual: float = 0.0
+    usual_hits: float = 0.0
 
 
 def weigh_evidence(rays: Int8Array, sd: Float64Array, modes: tuple[Mode, ...]) -> Evidence:
@@ -149,13 +151,21 @@ def has_outlived(settings: HealthSettings, trust: Trust, evidence: Evidence) -> 
     return trust.good_path_m >= settings.path_to_outlive_m and evidence.rivals <= settings.rival_share_max
 
 
-def judge(settings: HealthSettings, trust: Trust, evidence: Evidence) -> Trust:
-    """Trust with its verdict, once the updates are counted and the rivals, if any, are known."""
+def judge(settings: HealthSettings, trust: Trust, evidence: Evidence, *, slip: str = "") -> Trust:
+    """Trust with its verdict, once the updates are counted and the rivals, if any, are known.
+
+    Args:
+        slip: how odometry and the scan disagree, in words; such an update is at best UNCERTAIN, the next one may tell.
+    """
     health, reason = _verdict(settings, trust, evidence)
-    usual = trust.usual
-    if health is Health.LOCALIZED:
-        usual = evidence.explained if usual == 0.0 else usual + settings.usual_rate * (evidence.explained - usual)
-    return replace(trust, health=health, reason=reason, usual=usual)
+    if health is not Health.LOCALIZED:
+        return replace(trust, health=health, reason=reason)
+    if slip:
+        return replace(trust, health=Health.UNCERTAIN, reason=f"{slip}; the scan fits the map here")
+    rate = settings.usual_rate if trust.usual > 0 else 1.0
+    usual = trust.usual + rate * (evidence.explained - trust.usual)
+    usual_hits = trust.usual_hits + rate * (evidence.hit - trust.usual_hits)
+    return replace(trust, health=health, reason=reason, usual=usual, usual_hits=usual_hits)
 
 
 def _verdict(s: HealthSettings, trust: Trust, e: Evidence) -> tuple[Health, str]:

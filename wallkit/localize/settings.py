@@ -12,6 +12,7 @@ from wallkit.localize.motion import MOTIONS, MotionModel
 from wallkit.localize.recovery import RECOVERIES, Recovery
 from wallkit.localize.resample import RESAMPLERS
 from wallkit.localize.sensor import SENSORS, SensorModel
+from wallkit.localize.slip import SlipSettings
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,7 @@ class LocalizeSettings:
     motion: MotionModel = component(MOTIONS, "differential", "how odometry errs")
     sensor: SensorModel = component(SENSORS, "class_conditional", "how likely a scan is at a pose")
     recovery: Recovery = component(RECOVERIES, "relocalise", "what is done when the estimate is not trusted")
+    slip: SlipSettings = section(SlipSettings, "the look around when a scan does not fit where odometry led")
     ekf: EkfSettings = section(EkfSettings, "the Kalman filter, when it is the tracker")
     health: HealthSettings = section(HealthSettings, "when the estimate is trusted")
 
