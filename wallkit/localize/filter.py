@@ -82,8 +82,7 @@ class MonteCarloLocalizer:
         answer = self._judged(self._weighed(belief, scan), scan)
         if self._is_worth_a_look(belief, answer):
             near_by = self._judged(look_around(s.slip, rng, belief.particles, self.likelihood, scan), scan)
-            if speaks_for(s.health, belief.trust, near_by.evidence) and near_by.evidence.hit > answer.evidence.hit:
-                answer = near_by
+            answer = near_by if self._is_slip(belief, answer, near_by, scan) else answer
         evidence, off = answer.evidence, relative(belief.pose, answer.pose) if belief.updates > 0 else _STILL
         trust = count_updates(
             s.health,
@@ -195,6 +194,20 @@ class MonteCarloLocalizer:
             return False
         fits_less = evidence.hit < self.settings.slip.hits_of_usual * trust.usual_hits
         return fits_less or not speaks_for(self.settings.health, trust, evidence)
+
+    def _is_slip(self, belief: Belief, here: Answer, near_by: Answer, scan: LabelledScan) -> bool:
+        """Whether the scan fits near by as well as is usual and so much better than here that odometry must be wrong.
+
+        A wrong place can turn people into walls, but then other returns lie behind walls there.
+        """
+        slip, trust = self.settings.slip, belief.trust
+        at_here, at_near = self.likelihood.log_likelihood(np.stack([here.pose, near_by.pose]), scan)
+        return bool(
+            not slip.is_jump(relative(belief.pose, near_by.pose))
+            and at_near - at_here >= slip.log_odds
+            and near_by.evidence.explained >= slip.fit_of_usual * max(trust.usual, here.evidence.explained)
+            and near_by.evidence.hit >= slip.fit_of_usual * trust.usual_hits
+        )
 
     def _resampled(self, rng: np.random.Generator, particles: Particles, updates: int) -> Particles:
         s, weights = self.settings, normalised(particles.log_weights)

@@ -23,12 +23,14 @@ from wallkit.localize.sensor import Likelihood
 class SlipSettings:
     """How far odometry may be wrong in one step without the robot being lost."""
 
-    reach_m: float = setting(1.5, "farthest place looked at; 0 switches the look off", low=0)
-    reach_deg: float = setting(75.0, "largest error of heading looked at", low=0, high=180)
+    reach_m: float = setting(1.2, "farthest place looked at; 0 switches the look off", low=0)
+    reach_deg: float = setting(85.0, "largest error of heading looked at", low=0, high=180)
     poses: int = setting(8000, "poses tried in the first round", low=10)
+    hits_of_usual: float = setting(0.9, "share of the usual hits below which it is worth a look", low=0, high=1)
+    fit_of_usual: float = setting(0.95, "share of the usual fit that a place must reach to be taken", low=0, high=1)
+    log_odds: float = setting(12.0, "how much likelier the scan must be there [nat]", low=0)
     noticed_m: float = setting(0.5, "an estimate this far from where odometry led is a slip", low=0)
     noticed_deg: float = setting(20.0, "the same for the heading", low=0, high=180)
-    hits_of_usual: float = setting(0.9, "share of the usual hits below which it is worth a look", low=0, high=1)
 
     def is_slip(self, off: Float64Array) -> bool:
         """Whether the estimate is off (3,) what odometry says by more than its noise."""
@@ -37,7 +39,7 @@ class SlipSettings:
     def is_jump(self, off: Float64Array) -> bool:
         """Whether it is farther off than wheels slip: another hypothesis than before."""
         reach_m, reach_deg = max(self.reach_m, self.noticed_m), max(self.reach_deg, self.noticed_deg)
-        return bool(np.hypot(off[0], off[1]) > 1.5 * reach_m or abs(off[2]) > np.deg2rad(1.5 * reach_deg))
+        return bool(np.hypot(off[0], off[1]) > reach_m or abs(off[2]) > np.deg2rad(reach_deg))
 
 
 # every round has a quarter of the spread of the one before, and counts the scan for more
