@@ -43,7 +43,7 @@ class HealthSettings:
         4, "updates in a row for a new hypothesis that confirm it if it has no rival", low=1
     )
     path_to_outlive_m: float = setting(
-        15.0, "path that confirms it if it had rivals, all of which died on the way", low=0
+        8.0, "path that confirms it if it had rivals, all of which died on the way", low=0
     )
     odometry_gap_s: float = setting(
         10.0, "a longer silence of the odometry makes the estimate a hypothesis again", low=0
