@@ -20,6 +20,7 @@ from wallkit.localize.health import (
     has_outlived,
     is_ripe,
     judge,
+    raises_doubt,
     speaks_against,
     speaks_for,
     weigh_evidence,
@@ -73,8 +74,8 @@ class MonteCarloLocalizer:
 
     def update(self, rng: np.random.Generator, belief: Belief, scan: LabelledScan) -> tuple[Belief, StepInfo]:
         """The belief after a scan, and what the update did; without enough motion the belief as it was."""
-        s = self.settings
-        if not belief.is_due:
+        s, is_forced = self.settings, not belief.is_due
+        if is_forced:
             if not self._contradicts(belief, scan):
                 return belief, StepInfo(False, belief.trust.reason, particles=len(belief.particles))
             # odometry says the robot stood still, the scan says it did not: it was carried, turned, or hit
@@ -91,6 +92,7 @@ class MonteCarloLocalizer:
             path_m=belief.path_m,
             gap_s=belief.gap_s,
             has_jumped=s.slip.is_jump(off),
+            is_forced=is_forced,
         )
         assert belief.odometry is not None  # predict() comes first
         outcome = self.recovery.recover(
@@ -164,10 +166,11 @@ class MonteCarloLocalizer:
         )
 
     def _contradicts(self, belief: Belief, scan: LabelledScan) -> bool:
-        """Whether a scan taken between two updates speaks against the estimate carried on by odometry."""
+        """Whether a scan taken between two updates does not fit the estimate carried on by odometry."""
         rays = self._rays_at(scan, compose(belief.pose, belief.pending))
         evidence = weigh_evidence(rays, np.sqrt(np.diag(belief.covariance)), belief.modes)
-        return speaks_against(self.settings.health, belief.trust, evidence)
+        health, trust = self.settings.health, belief.trust
+        return speaks_against(health, trust, evidence) or (trust.is_confirmed and raises_doubt(health, trust, evidence))
 
     def _rays_at(self, scan: LabelledScan, pose: Float64Array) -> Int8Array:
         h = self.settings.health

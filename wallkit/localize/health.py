@@ -116,19 +116,32 @@ def speaks_against(s: HealthSettings, trust: Trust, e: Evidence) -> bool:
     return e.hit + e.long >= s.least_reached and e.explained < max(s.bad_explained, s.bad_of_usual * trust.usual)
 
 
+def raises_doubt(s: HealthSettings, trust: Trust, e: Evidence) -> bool:
+    """Whether an update fits worse than at the right place; one that reached nothing says nothing."""
+    return e.hit + e.long >= s.least_reached and e.explained < max(s.good_explained, s.good_of_usual * trust.usual)
+
+
 def count_updates(
-    settings: HealthSettings, before: Trust, evidence: Evidence, *, path_m: float, gap_s: float, has_jumped: bool
+    settings: HealthSettings,
+    before: Trust,
+    evidence: Evidence,
+    *,
+    path_m: float,
+    gap_s: float,
+    has_jumped: bool,
+    is_forced: bool = False,
 ) -> Trust:
     """Trust with this update counted, and a hypothesis given up that has too much against it; the verdict comes later.
 
     Args:
         path_m: driven since the last update. gap_s: longest silence of the odometry since then.
         has_jumped: the estimate is not where odometry led it: this is another hypothesis than before.
+        is_forced: the robot stood still: seeing the same doubtful scan again and again is no new doubt.
     """
     is_good, is_bad = speaks_for(settings, before, evidence), speaks_against(settings, before, evidence)
     good = before.good + 1 if is_good else 0
     bad = before.bad + 1 if is_bad else 0
-    doubtful = 0 if is_good else before.doubtful + 1
+    doubtful = 0 if is_good else before.doubtful + (not is_forced)
     is_lost = bad >= settings.bad_updates_to_lose or doubtful >= settings.doubtful_updates_to_lose
     confirmed = before.is_confirmed and not (is_lost or has_jumped or gap_s > settings.odometry_gap_s)
     if has_jumped or (before.is_confirmed and not confirmed):
