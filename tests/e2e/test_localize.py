@@ -132,6 +132,7 @@ def test_evaluate_report_and_compare_read_a_folder_again(wallkit, tmp_path):
         (["localize", LOG, "--map", MAP, "--init", "here"], "'here' is no start"),
         (["localize", LOG, "--map", MAP, "--init", "topic"], "no initial pose topic"),
         (["localize", LOG, "--map", MAP, "--init", "1,2,nan"], "is no start"),
+        (["localize", LOG, "--map", MAP, "--init", "100,100,0"], "outside the map"),
         (["localize", LOG, "--map", MAP, "--scan", "/lidar"], "/lidar"),
         (["localize", LOG, "--map", MAP, "--set", "localize.particels=3"], "particles"),
         (["localize", LOG, "--map", MAP, "--set", "localize.particles=0"], "at least 1"),
@@ -205,6 +206,8 @@ def test_demo_is_as_expected(wallkit, tmp_path):
     assert done.json["surprises"] == []
     assert set(done.json["methods"]) == {"basic", "novelty", "class_conditional"}
     assert (tmp_path / "wallkit-demo" / "report.html").is_file()
+    assert wallkit("demo", "-q").code == 2
+    assert wallkit("demo", "-q", "--overwrite").code == 0
 
 
 def test_doctor_and_completion(wallkit):

@@ -121,8 +121,9 @@ def test_a_new_hypothesis_ripens_and_outlives():
     assert not is_ripe(SETTINGS, young, good)
     assert is_ripe(SETTINGS, ripe, good)
     assert ripe.health is Health.UNCERTAIN
-    assert not has_outlived(SETTINGS, ripe, good)
-    assert has_outlived(SETTINGS, old, good)
+    assert not has_outlived(SETTINGS, ripe, good, were_sought=True)
+    assert has_outlived(SETTINGS, old, good, were_sought=True)
+    assert not has_outlived(SETTINGS, old, good, were_sought=False)
 
 
 def test_no_returns_explain_nothing():

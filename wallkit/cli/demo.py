@@ -9,8 +9,8 @@ import click
 from wallkit.cli import common
 
 COLUMNS = (
-    ("ate_rmse_m", "error rmse", "cm", 100.0),
-    ("ate_max_m", "at most", "cm", 100.0),
+    ("ate_median_m", "median error", "cm", 100.0),
+    ("heading_error_median_deg", "heading", "deg", 1.0),
     ("updates_to_converge", "converged after", "updates", 1.0),
     ("false_healthy", "false healthy", "scans", 1.0),
     ("availability", "available", "%", 100.0),

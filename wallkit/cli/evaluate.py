@@ -208,7 +208,7 @@ def _write_evo(out: Path | None, found: list[tuple[RunRecord, Evaluation]]) -> N
             if SERIES[name](evaluation.pairs) is not None:
                 seed = f"-seed-{record.run['seed']}" if len(found) > 1 else ""
                 write_evo_zip(out / f"{name}{seed}.zip", evaluation.pairs, name)
-    click.echo(f"evo      {out}")
+    click.echo(f"evo      {out}", err=True)
 
 
 def _names(runs: tuple[Path, ...]) -> list[str]:

@@ -90,7 +90,8 @@ class ScanMatchingEkf:
         )
         evidence = weigh_evidence(rays, np.sqrt(np.diag(covariance)), (Mode(pose, covariance, 1.0),))
         trust = count_updates(h, belief.trust, evidence, path_m=belief.path_m, gap_s=belief.gap_s, has_jumped=False)
-        trust = judge(h, replace(trust, is_confirmed=trust.is_confirmed or has_outlived(h, trust, evidence)), evidence)
+        outlived = has_outlived(h, trust, evidence, were_sought=False)
+        trust = judge(h, replace(trust, is_confirmed=trust.is_confirmed or outlived), evidence)
         info = StepInfo(True, trust.reason, evidence)
         after = GaussianBelief(pose, covariance, belief.odometry, trust, updates=belief.updates + 1)
         return after, info

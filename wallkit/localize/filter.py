@@ -110,7 +110,8 @@ class MonteCarloLocalizer:
                 is_fitting=trust.good >= 2,
             ),
         )
-        confirmed = trust.is_confirmed or outcome.confirms or has_outlived(s.health, trust, evidence)
+        outlived = has_outlived(s.health, trust, evidence, were_sought=self.recovery.seeks_rivals)
+        confirmed = trust.is_confirmed or outcome.confirms or outlived
         slip = describe_slip(off) if s.slip.is_slip(off) else ""
         trust = judge(s.health, replace(trust, is_confirmed=confirmed), evidence, slip=slip)
         effective = effective_size(normalised(answer.particles.log_weights))

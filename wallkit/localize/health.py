@@ -45,6 +45,7 @@ class HealthSettings:
     path_to_outlive_m: float = setting(
         8.0, "path that confirms it if it had rivals, all of which died on the way", low=0
     )
+    path_unsought_m: float = setting(25.0, "the same where the recovery does not search the map for rivals", low=0)
     odometry_gap_s: float = setting(
         10.0, "a longer silence of the odometry makes the estimate a hypothesis again", low=0
     )
@@ -159,9 +160,14 @@ def is_ripe(settings: HealthSettings, trust: Trust, evidence: Evidence) -> bool:
     )
 
 
-def has_outlived(settings: HealthSettings, trust: Trust, evidence: Evidence) -> bool:
-    """Whether an unconfirmed hypothesis fitted for so long that rivals, seeded again and again, had their chance."""
-    return trust.good_path_m >= settings.path_to_outlive_m and evidence.rivals <= settings.rival_share_max
+def has_outlived(settings: HealthSettings, trust: Trust, evidence: Evidence, *, were_sought: bool) -> bool:
+    """Whether an unconfirmed hypothesis fitted for so long that its rivals had their chance.
+
+    Args:
+        were_sought: rivals were searched for and seeded again and again; else only those of the start were ever there.
+    """
+    path_m = settings.path_to_outlive_m if were_sought else settings.path_unsought_m
+    return trust.good_path_m >= path_m and evidence.rivals <= settings.rival_share_max
 
 
 def judge(settings: HealthSettings, trust: Trust, evidence: Evidence, *, slip: str = "") -> Trust:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -87,7 +87,9 @@ class Recovery(Protocol):
 
 
 class BoundRecovery(Protocol):
-    """A recovery on one map."""
+    """A recovery on one map; `seeks_rivals` if it searches the map for places that explain the scans as well."""
+
+    seeks_rivals: ClassVar[bool]
 
     def recover(self, rng: np.random.Generator, particles: Particles, memory: Memory, now: Situation) -> Outcome:
         """Look at the situation after an update, and change the particles if need be."""
@@ -124,6 +126,7 @@ class Relocalise:
 
 @dataclass
 class _Relocaliser:
+    seeks_rivals: ClassVar[bool] = True
     settings: Relocalise
     fields: FieldSet
     # the pyramid is built at the first search: a robot that never loses its way never pays for it
@@ -217,6 +220,7 @@ class Augmented:
 
 @dataclass(frozen=True)
 class _AugmentedRecovery:
+    seeks_rivals: ClassVar[bool] = False
     settings: Augmented
     fields: FieldSet
 
@@ -249,6 +253,8 @@ class NoRecovery:
 
 @dataclass(frozen=True)
 class _NoRecovery:
+    seeks_rivals: ClassVar[bool] = False
+
     def recover(self, rng: np.random.Generator, particles: Particles, memory: Memory, now: Situation) -> Outcome:
         """See BoundRecovery."""
         return Outcome(particles, memory)

@@ -22,6 +22,7 @@ SEPARATION_RAD = np.deg2rad(30.0)
 LEVELS = 4
 # a level never holds more blocks than this: memory stays bounded, and the best are kept
 BLOCKS_MAX = 400_000
+PORTION = 50_000
 
 
 @dataclass(frozen=True)
@@ -92,12 +93,11 @@ def find_places(
     top = _blocks_over_free_space(at, headings)
     bounds = _bounds(at, LEVELS, top, offsets)
     best = _greedy_best(at, top, bounds, offsets)
-    blocks, scores = _kept(top, bounds, keep * best)
+    good = np.flatnonzero(bounds >= keep * best)
+    blocks, scores = _most(top[:, good], bounds[good])
     for level in range(LEVELS - 1, -1, -1):
-        blocks = _split(at, blocks, level)
-        if level == 0:
-            blocks = blocks[:, at.is_free[blocks[1], blocks[0]]]
-        blocks, scores = _kept(blocks, _bounds(at, level, blocks, offsets), keep * best)
+        parts = [_refined(at, level, part, offsets, keep * best) for part in _in_portions(blocks)]
+        blocks, scores = _most(np.concatenate([b for b, _ in parts], axis=1), np.concatenate([s for _, s in parts]))
     return _separated(at, blocks, scores, turns, places_max)
 
 
@@ -149,11 +149,29 @@ def _bounds(at: SearchMap, level: int, blocks: Int64Array, offsets: Int64Array) 
     return scores
 
 
-def _kept(blocks: Int64Array, scores: Float64Array, least: float) -> tuple[Int64Array, Float64Array]:
+def _in_portions(blocks: Int64Array) -> list[Int64Array]:
+    """The blocks a portion at a time, so that splitting them takes little memory; at least one portion."""
+    return [blocks[:, i : i + PORTION] for i in range(0, max(blocks.shape[1], 1), PORTION)]
+
+
+def _refined(
+    at: SearchMap, level: int, blocks: Int64Array, offsets: Int64Array, least: float
+) -> tuple[Int64Array, Float64Array]:
+    """The quarters of the blocks that may still hold an answer scoring `least`, and their bounds."""
+    blocks = _split(at, blocks, level)
+    if level == 0:
+        blocks = blocks[:, at.is_free[blocks[1], blocks[0]]]
+    scores = _bounds(at, level, blocks, offsets)
     good = np.flatnonzero(scores >= least)
-    if len(good) > BLOCKS_MAX:
-        good = good[np.argpartition(-scores[good], BLOCKS_MAX)[:BLOCKS_MAX]]
     return blocks[:, good], scores[good]
+
+
+def _most(blocks: Int64Array, scores: Float64Array) -> tuple[Int64Array, Float64Array]:
+    """The best BLOCKS_MAX of them."""
+    if len(scores) <= BLOCKS_MAX:
+        return blocks, scores
+    best = np.argpartition(-scores, BLOCKS_MAX)[:BLOCKS_MAX]
+    return blocks[:, best], scores[best]
 
 
 def _separated(

@@ -103,15 +103,18 @@ def cells_from_pixels(pixels: np.ndarray, spec: RasterSpec) -> Int8Array:
     As Nav2: the alpha channel counts as brightness in trinary mode, makes a pixel unknown in scale mode, is ignored in raw.
     """
     if pixels.ndim == 2:
-        # one look-up of 256 shades instead of arithmetic over millions of pixels
-        shades = np.arange(256, dtype=np.float64)
-        return np.ascontiguousarray(_cells_from_shades(shades / 255.0, None, spec)[pixels[::-1]])
-    colours, alpha = (pixels[..., :-1], pixels[..., -1]) if pixels.shape[2] in (2, 4) else (pixels, None)
-    averaged = pixels if spec.mode == "trinary" else colours
-    return np.ascontiguousarray(_cells_from_shades(averaged.mean(axis=2) / 255.0, alpha, spec)[::-1])
+        pixels = pixels[..., None]
+    has_alpha = pixels.shape[2] in (2, 4)
+    averaged = pixels[..., :-1] if has_alpha and spec.mode != "trinary" else pixels
+    brightest = 255 * averaged.shape[2]
+    # one look-up of a few hundred sums instead of floating point arithmetic over millions of pixels
+    cells = _cells_from_shades(np.arange(brightest + 1) / brightest, spec)[averaged.sum(axis=2, dtype=np.uint16)]
+    if has_alpha and spec.mode == "scale":
+        cells[pixels[..., -1] < 255] = -1
+    return np.ascontiguousarray(cells[::-1])
 
 
-def _cells_from_shades(shade: Float64Array, alpha: np.ndarray | None, spec: RasterSpec) -> Int8Array:
+def _cells_from_shades(shade: Float64Array, spec: RasterSpec) -> Int8Array:
     """Occupancy of shades in [0, 1]."""
     if spec.mode == "raw":
         value = np.round(shade * 255.0)
@@ -121,8 +124,6 @@ def _cells_from_shades(shade: Float64Array, alpha: np.ndarray | None, spec: Rast
     if spec.mode == "scale":
         between = np.rint((occupancy - spec.free_thresh) / (spec.occupied_thresh - spec.free_thresh) * 100.0)
     cells = np.where(occupancy > spec.occupied_thresh, 100, np.where(occupancy < spec.free_thresh, 0, between))
-    if spec.mode == "scale" and alpha is not None:
-        cells = np.where(alpha < 255, -1, cells)
     return cells.astype(np.int8)
 
 
@@ -149,8 +150,8 @@ def _oddities(path: Path, lines: dict[str, int], spec: RasterSpec, pixels: np.nd
             f"the origin is turned by {spec.origin[2]:.4g} rad: honoured here, ignored by many tools",
             line=lines.get("origin"),
         )
-    values = np.unique(pixels)
-    if spec.mode != "trinary" and len(values) <= 3:
+    values = np.unique(pixels) if spec.mode != "trinary" else ()
+    if 0 < len(values) <= 3:
         yield Finding(
             "WK-R007",
             "warning",

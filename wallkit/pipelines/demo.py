@@ -13,7 +13,7 @@ from wallkit.pipelines.config import load_config
 from wallkit.pipelines.evaluate import Evaluation
 from wallkit.pipelines.localize import Request, prepare
 from wallkit.pipelines.report import compare_runs, write_compare_report
-from wallkit.pipelines.run_folder import RunRecord, read_json
+from wallkit.pipelines.run_folder import RunRecord, read_json, write_json
 from wallkit.pipelines.seeds import run_seed
 
 SAMPLE = Path(wallkit.sample.__file__).parent
@@ -49,6 +49,13 @@ def run_demo(out: Path, observe: Callable[[str], None] | None = None) -> Demo:
     settings = load_config(None).config.evaluate
     data = compare_runs([[pair] for pair in runs.values()], list(runs), settings, seed=0)
     write_compare_report(out / "report.html", data)
+    first = next(iter(runs.values()))[0].run
+    about = {
+        "schema": 1,
+        "wallkit": first["wallkit"],
+        "methods": {name: list(words) for name, words in METHODS.items()},
+    }
+    write_json(out / "run.json", about)
     return Demo(runs, tuple(surprises(runs, read_json(SAMPLE / "expected.json"))))
 
 

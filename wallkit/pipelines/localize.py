@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from wallkit.core.geometry import interpolate_poses
+from wallkit.core.grid import distances_at
 from wallkit.core.steps import Steps
 from wallkit.core.types import Estimate, Float64Array, LabelledScan, StampedPose, Trajectory
 from wallkit.errors import ConfigError, LogError
@@ -114,6 +115,8 @@ def prepare(request: Request, config: Config) -> Prepared:
     truth = _find_truth(log, request.truth)
     window = _window_ns(log, rig, request)
     start = _find_start(log, request, truth, rig, window)
+    if isinstance(start, StampedPose):
+        _check_on_map(start.pose, loaded)
     return Prepared(request, config, log, rig, loaded, truth, start, window)
 
 
@@ -221,6 +224,19 @@ def _start_from_truth(
         raise LogError("the truth does not reach the first scan", where=log.name, hint="start later with --start")
     pose = interpolate_poses(truth.stamps_ns, truth.poses, [stamp_ns])[0]
     return StampedPose(stamp_ns, "map", pose, np.diag(np.square(TRUTH_SD)))
+
+
+def _check_on_map(pose: Float64Array, loaded: LoadedMap) -> None:
+    """Refuse a start that the map does not reach: the filter would believe it and then be lost for no visible reason."""
+    if not np.isfinite(distances_at(loaded.fields, pose[None, :2])[0]):
+        height, width = loaded.fields.shape
+        corner = loaded.fields.origin
+        raise ConfigError(
+            f"the start x {pose[0]:.2f} m, y {pose[1]:.2f} m lies outside the map",
+            where="--init",
+            hint=f"the map has its corner at {corner[0]:.2f}, {corner[1]:.2f} and is "
+            f"{width * loaded.fields.resolution_m:.1f} x {height * loaded.fields.resolution_m:.1f} m",
+        )
 
 
 def _pose_from_words(words: str) -> Float64Array:

@@ -1,0 +1,84 @@
+"""Every rule about maps, and `validate`, which runs them over a file.
+
+A new group is a module with a tuple RULES, named here.
+"""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from wallkit.errors import ConfigError, MapError, closest
+from wallkit.maps.rules import graph, joints, schema, values, xml_bytes
+from wallkit.maps.rules.base import Context, Rule
+from wallkit.maps.rules.docs import text_from_doc
+from wallkit.maps.rules.engine import Report, codes_matching, run
+from wallkit.maps.rules.tolerances import Tolerances
+from wallkit.maps.xml import parse
+
+_GROUPS = (xml_bytes.RULES, schema.RULES, values.RULES, graph.RULES, joints.RULES)
+
+RULES: dict[str, Rule] = {rule.code: rule for group in _GROUPS for rule in sorted(group, key=lambda rule: rule.code)}
+
+# groups that a purpose needs, as words for `select`
+PROFILES: Mapping[str, tuple[str, ...]] = {
+    name: tuple(group for group in groups if any(rule.group == group for rule in RULES.values()))
+    for name, groups in {
+        "schema": "XSG",
+        "geometry": "XSGEOTC",
+        "localization": "XSGEOTCLP",
+        "simulation": "XSGEOCP",
+        "compat": "XSP",
+    }.items()
+}
+
+
+def validate(
+    file: Path | bytes,
+    tolerances: Tolerances | None = None,
+    *,
+    select: Sequence[str] = (),
+    ignore: Sequence[str] = (),
+    source: str = "map",
+    in_set: bool = False,
+    today: datetime.date | None = None,
+) -> Report:
+    """Everything the rules have to say about a map file or its bytes.
+
+    Args:
+        select, ignore: codes or prefixes ("WK-E010", "E"); none selected means all. What is selected runs only where the
+            groups it builds on hold.
+        source: name for messages, for bytes; meshes are looked for beside it.
+        in_set: the file is one level of several.
+        today: inline ignores that ended before it no longer count.
+
+    Raises:
+        MapError: the file cannot be read from disk. ConfigError: no rule begins with a selector.
+    """
+    if isinstance(file, Path):
+        try:
+            data = file.read_bytes()
+        except OSError as error:
+            raise MapError(
+                f"cannot read the map: {error.strerror}", where=file, hint="name a .wkmap.urdf file"
+            ) from error
+        source = str(file)
+    else:
+        data = file
+    selected = codes_matching(select, RULES) if select else set(RULES)
+    selected -= codes_matching(ignore, RULES)
+    context = Context(parse(data, source), tolerances or Tolerances(), in_set=in_set)
+    return run(context, list(RULES.values()), selected, today=today)
+
+
+def explain(code: str) -> str:
+    """The documentation of a rule, by "WK-G001" or "G001".
+
+    Raises:
+        ConfigError: there is no such rule.
+    """
+    full = code.upper() if code.upper().startswith("WK-") else f"WK-{code.upper()}"
+    if full not in RULES:
+        raise ConfigError(f"there is no map rule '{code}'", hint=closest(full, RULES))
+    return text_from_doc(RULES[full])
