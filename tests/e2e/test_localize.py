@@ -28,7 +28,9 @@ FILES = {
 
 def test_a_run_says_five_things_and_leaves_a_folder(wallkit, tmp_path):
     done = wallkit("localize", LOG, "--map", MAP)
-    assert (done.code, done.err) == (0, "")
+    assert done.code == 0
+    # a first run compiles, which takes long enough for progress to be shown
+    assert all(line.startswith("scans: ") for line in done.err.splitlines())
     assert [line.split()[0] for line in done.out.splitlines() if line] == [
         "where",
         "sure",

