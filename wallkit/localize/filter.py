@@ -110,7 +110,10 @@ class MonteCarloLocalizer:
                 is_fitting=trust.good >= 2,
             ),
         )
-        outlived = has_outlived(s.health, trust, evidence, were_sought=self.recovery.seeks_rivals)
+        seeks = self.recovery.seeks_rivals
+        outlived = has_outlived(s.health, trust, evidence, were_sought=seeks) and not (
+            seeks and outcome.memory.has_twin
+        )
         confirmed = trust.is_confirmed or outcome.confirms or outlived
         slip = describe_slip(off) if s.slip.is_slip(off) else ""
         trust = judge(s.health, replace(trust, is_confirmed=confirmed), evidence, slip=slip)

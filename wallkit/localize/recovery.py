@@ -43,6 +43,7 @@ class Memory:
     places: tuple[Place, ...] = ()
     views_to_wait: int = 0
     patience: int = 0
+    has_twin: bool = True
     slow: float = 0.0
     fast: float = 0.0
 
@@ -109,6 +110,7 @@ class Relocalise:
     view_turn_deg: float = setting(20.0, "or after this turn", low=0)
     points: int = setting(180, "points of all views together used in a search", low=10)
     range_max_m: float = setting(20.0, "farther points are not used", low=0.1)
+    twin: float = setting(0.95, "a place scoring at least this share of the best cannot be outlived", low=0, high=1)
     keep: float = setting(0.85, "places scoring less than this share of the best are no hypotheses", low=0, high=1)
     rival: float = setting(0.93, "a place scoring at least this share of the best is a rival", low=0, high=1)
     share: float = setting(0.5, "share of the particles moved to the places found when lost", low=0, high=1)
@@ -136,16 +138,22 @@ class _Relocaliser:
         """See BoundRecovery."""
         memory, is_new = self._remembered(memory, now)
         if now.is_confirmed:
-            return Outcome(particles, replace(memory, places=(), views_to_wait=0, patience=0))
+            return Outcome(particles, replace(memory, places=(), views_to_wait=0, patience=0, has_twin=True))
         if not is_new:
             return Outcome(particles, memory)
         if memory.views_to_wait > 0:
             return Outcome(particles, replace(memory, views_to_wait=memory.views_to_wait - 1))
         places = tuple(self.candidates(memory, now.odometry))
-        confirms = now.is_ripe and len(memory.views) >= self.settings.views_to_confirm and self._agrees(places, now)
+        confirms = (
+            now.is_ripe
+            and len(memory.views) >= self.settings.views_to_confirm
+            and self._is_best(places, now, self.settings.rival)
+        )
         # search after 1, 2, 3, 5, 9, 17, ... views: the first ones settle it or it takes long
         wait = min(memory.patience, self.settings.wait_views_max)
-        memory = replace(memory, places=places, views_to_wait=wait, patience=max(1, 2 * memory.patience))
+        has_twin = not self._is_best(places, now, self.settings.twin)
+        patience = max(1, 2 * memory.patience)
+        memory = replace(memory, places=places, views_to_wait=wait, patience=patience, has_twin=has_twin)
         if confirms or not places:
             return Outcome(particles, memory, confirms)
         share = self.settings.share_of_doubt if now.is_fitting else self.settings.share
@@ -171,7 +179,7 @@ class _Relocaliser:
         views = memory.views
         if now.was_confirmed and not now.is_confirmed:
             # what was seen on the way into the wrong place may be stitched by the very odometry that failed
-            views, memory = (), replace(memory, views_to_wait=0, patience=0)
+            views, memory = (), replace(memory, views_to_wait=0, patience=0, has_twin=True)
         if views:
             moved = relative(views[-1].odometry, now.odometry)
             if np.hypot(moved[0], moved[1]) < s.view_distance_m and abs(moved[2]) < np.deg2rad(s.view_turn_deg):
@@ -180,13 +188,13 @@ class _Relocaliser:
         view = View(now.odometry, now.points.xyz_m[used, :2].astype(np.float64))
         return replace(memory, views=(*views, view)[-s.views :]), True
 
-    def _agrees(self, places: tuple[Place, ...], now: Situation) -> bool:
-        """The best place is where the filter is, and no other comes near it."""
+    def _is_best(self, places: tuple[Place, ...], now: Situation, share: float) -> bool:
+        """The best place is where the filter is, and no other scores this share of it."""
         if not places:
             return False
         off = relative(places[0].pose, now.estimate)
         is_here = np.hypot(off[0], off[1]) < 0.75 and abs(off[2]) < np.deg2rad(20.0)
-        has_rival = len(places) > 1 and places[1].score >= self.settings.rival * places[0].score
+        has_rival = len(places) > 1 and places[1].score >= share * places[0].score
         return bool(is_here and not has_rival)
 
     def _seeded(
