@@ -144,7 +144,7 @@ def test_a_robot_that_cannot_tell_two_places_apart_says_so(wallkit, data, tmp_pa
     assert done.json["health"] != "LOCALIZED"
     assert len(done.json["modes"]) >= 2
     after = wallkit("localize", folder / "target_after.bag", "--map", folder / "map/all.yaml", "--json", "-q")
-    assert after.code == 0
+    assert after.code in (0, 4)
     off = np.array([after.json["modes"][0][k] for k in ("x_m", "y_m", "yaw_rad")]) - (-3.27, 18.23, -2.92)
     assert np.hypot(off[0], off[1]) < 0.3
 

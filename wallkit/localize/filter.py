@@ -27,7 +27,7 @@ from wallkit.localize.health import (
 )
 from wallkit.localize.initial import SPREADS, START_SD, around_pose
 from wallkit.localize.particles import Particles, effective_size, equally_weighted, normalised
-from wallkit.localize.recovery import BoundRecovery, Memory, Situation, moved_places
+from wallkit.localize.recovery import BoundRecovery, Memory, Situation, has_twin, moved_memory
 from wallkit.localize.resample import RESAMPLERS, kld_size, roughened
 from wallkit.localize.sensor import Likelihood
 from wallkit.localize.settings import LocalizeSettings
@@ -111,9 +111,9 @@ class MonteCarloLocalizer:
             ),
         )
         seeks = self.recovery.seeks_rivals
-        outlived = has_outlived(s.health, trust, evidence, were_sought=seeks) and not (
-            seeks and outcome.memory.has_twin
-        )
+        outlived = has_outlived(s.health, trust, evidence, were_sought=seeks)
+        if seeks and has_twin(outcome.memory, answer.pose):
+            outlived = False
         confirmed = trust.is_confirmed or outcome.confirms or outlived
         slip = describe_slip(off) if s.slip.is_slip(off) else ""
         trust = judge(s.health, replace(trust, is_confirmed=confirmed), evidence, slip=slip)
@@ -166,7 +166,7 @@ class MonteCarloLocalizer:
             path_m=float(np.hypot(moved[0], moved[1])),
             pose=compose(belief.pose, moved),
             modes=tuple(replace(mode, pose=compose(mode.pose, moved)) for mode in belief.modes),
-            memory=replace(belief.memory, places=moved_places(belief.memory.places, moved)),
+            memory=moved_memory(belief.memory, moved),
         )
 
     def _contradicts(self, belief: Belief, scan: LabelledScan) -> bool:
@@ -174,7 +174,9 @@ class MonteCarloLocalizer:
         rays = self._rays_at(scan, compose(belief.pose, belief.pending))
         evidence = weigh_evidence(rays, np.sqrt(np.diag(belief.covariance)), belief.modes)
         health, trust = self.settings.health, belief.trust
-        return speaks_against(health, trust, evidence) or (trust.is_confirmed and raises_doubt(health, trust, evidence))
+        return speaks_against(health, trust, evidence) or (
+            (trust.is_confirmed or trust.good >= 2) and raises_doubt(health, trust, evidence)
+        )
 
     def _rays_at(self, scan: LabelledScan, pose: Float64Array) -> Int8Array:
         h = self.settings.health

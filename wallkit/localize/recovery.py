@@ -16,6 +16,7 @@ from wallkit.core.config import setting
 from wallkit.core.geometry import compose, relative, transform_points, wrap_angle
 from wallkit.core.grid import spread_of
 from wallkit.core.types import FieldSet, Float64Array, Points
+from wallkit.localize.estimate import near_pose
 from wallkit.localize.initial import over_free_space
 from wallkit.localize.particles import Particles, normalised
 from wallkit.localize.search import Place, SearchMap, find_places, prepare_search
@@ -40,10 +41,9 @@ class Memory:
     """
 
     views: tuple[View, ...] = ()
-    places: tuple[Place, ...] = ()
+    survivors: tuple[Place, ...] | None = None
     views_to_wait: int = 0
     patience: int = 0
-    has_twin: bool = True
     slow: float = 0.0
     fast: float = 0.0
 
@@ -110,7 +110,6 @@ class Relocalise:
     view_turn_deg: float = setting(20.0, "or after this turn", low=0)
     points: int = setting(180, "points of all views together used in a search", low=10)
     range_max_m: float = setting(20.0, "farther points are not used", low=0.1)
-    twin: float = setting(0.95, "a place scoring at least this share of the best cannot be outlived", low=0, high=1)
     keep: float = setting(0.85, "places scoring less than this share of the best are no hypotheses", low=0, high=1)
     rival: float = setting(0.93, "a place scoring at least this share of the best is a rival", low=0, high=1)
     share: float = setting(0.5, "share of the particles moved to the places found when lost", low=0, high=1)
@@ -138,22 +137,18 @@ class _Relocaliser:
         """See BoundRecovery."""
         memory, is_new = self._remembered(memory, now)
         if now.is_confirmed:
-            return Outcome(particles, replace(memory, places=(), views_to_wait=0, patience=0, has_twin=True))
+            return Outcome(particles, replace(memory, survivors=None, views_to_wait=0, patience=0))
         if not is_new:
             return Outcome(particles, memory)
         if memory.views_to_wait > 0:
             return Outcome(particles, replace(memory, views_to_wait=memory.views_to_wait - 1))
         places = tuple(self.candidates(memory, now.odometry))
-        confirms = (
-            now.is_ripe
-            and len(memory.views) >= self.settings.views_to_confirm
-            and self._is_best(places, now, self.settings.rival)
-        )
+        confirms = now.is_ripe and len(memory.views) >= self.settings.views_to_confirm and self._agrees(places, now)
         # search after 1, 2, 3, 5, 9, 17, ... views: the first ones settle it or it takes long
         wait = min(memory.patience, self.settings.wait_views_max)
-        has_twin = not self._is_best(places, now, self.settings.twin)
         patience = max(1, 2 * memory.patience)
-        memory = replace(memory, places=places, views_to_wait=wait, patience=patience, has_twin=has_twin)
+        survivors = still_found(memory.survivors, places)
+        memory = replace(memory, survivors=survivors, views_to_wait=wait, patience=patience)
         if confirms or not places:
             return Outcome(particles, memory, confirms)
         share = self.settings.share_of_doubt if now.is_fitting else self.settings.share
@@ -179,7 +174,7 @@ class _Relocaliser:
         views = memory.views
         if now.was_confirmed and not now.is_confirmed:
             # what was seen on the way into the wrong place may be stitched by the very odometry that failed
-            views, memory = (), replace(memory, views_to_wait=0, patience=0, has_twin=True)
+            views, memory = (), replace(memory, survivors=None, views_to_wait=0, patience=0)
         if views:
             moved = relative(views[-1].odometry, now.odometry)
             if np.hypot(moved[0], moved[1]) < s.view_distance_m and abs(moved[2]) < np.deg2rad(s.view_turn_deg):
@@ -188,13 +183,13 @@ class _Relocaliser:
         view = View(now.odometry, now.points.xyz_m[used, :2].astype(np.float64))
         return replace(memory, views=(*views, view)[-s.views :]), True
 
-    def _is_best(self, places: tuple[Place, ...], now: Situation, share: float) -> bool:
-        """The best place is where the filter is, and no other scores this share of it."""
+    def _agrees(self, places: tuple[Place, ...], now: Situation) -> bool:
+        """The best place is where the filter is, and no other comes near it."""
         if not places:
             return False
         off = relative(places[0].pose, now.estimate)
         is_here = np.hypot(off[0], off[1]) < 0.75 and abs(off[2]) < np.deg2rad(20.0)
-        has_rival = len(places) > 1 and places[1].score >= share * places[0].score
+        has_rival = len(places) > 1 and places[1].score >= self.settings.rival * places[0].score
         return bool(is_here and not has_rival)
 
     def _seeded(
@@ -282,9 +277,25 @@ def _replaced(rng: np.random.Generator, particles: Particles, poses: Float64Arra
     return Particles(kept, log_weights)
 
 
-def moved_places(places: tuple[Place, ...], odometry: Float64Array) -> tuple[Place, ...]:
-    """Places after the robot has moved by `odometry` (3,)."""
-    return tuple(Place(compose(place.pose, odometry), place.score) for place in places)
+def still_found(before: tuple[Place, ...] | None, places: tuple[Place, ...]) -> tuple[Place, ...]:
+    """The places that were among the survivors before and are found again; all of them when nothing was left or asked."""
+    again = [place for place in places if before and near_pose(np.array([p.pose for p in before]), place.pose).any()]
+    return tuple(again) or places
+
+
+def has_twin(memory: Memory, estimate: Float64Array) -> bool:
+    """Whether another place than the estimate (3,) has explained the views of every search so far, or none was made yet."""
+    if memory.survivors is None:
+        return True
+    return not all(near_pose(place.pose[None], estimate)[0] for place in memory.survivors)
+
+
+def moved_memory(memory: Memory, odometry: Float64Array) -> Memory:
+    """The memory after the robot has moved by `odometry` (3,)."""
+    if not memory.survivors:
+        return memory
+    moved = tuple(Place(compose(place.pose, odometry), place.score) for place in memory.survivors)
+    return replace(memory, survivors=moved)
 
 
 RECOVERIES: dict[str, type[Recovery]] = {
