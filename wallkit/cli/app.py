@@ -13,6 +13,7 @@ from wallkit.cli.doctor import doctor
 from wallkit.cli.evaluate import compare, evaluate, report
 from wallkit.cli.localize import localize
 from wallkit.cli.log import log
+from wallkit.cli.map import map_group
 
 
 @click.group(cls=WallkitGroup, context_settings=CONTEXT)
@@ -30,5 +31,5 @@ def main() -> None:
     """
 
 
-for command in (demo, log, localize, evaluate, compare, report, bench, config, completion, doctor):
+for command in (demo, log, map_group, localize, evaluate, compare, report, bench, config, completion, doctor):
     main.add_command(command)

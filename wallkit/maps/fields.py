@@ -24,6 +24,10 @@ class MapsSettings:
     wall_depth_m: float = setting(
         0.5, "how far behind its visible side a raster's wall may still be the surface", low=0
     )
+    scan_plane_m: float | None = setting(
+        None, "height above the floor at which a semantic map is cut; none takes the map's scan_plane", low=0
+    )
+    cell_m: float = setting(0.025, "side of a cell of the fields of a semantic map", low=0.005, high=1)
 
 
 def fields_from_grid(grid: OccupancyGrid, *, wall_depth_m: float = MapsSettings.wall_depth_m) -> FieldSet:

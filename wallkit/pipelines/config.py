@@ -11,6 +11,7 @@ from wallkit.core.config import Source, build, read_toml, section, setting, sour
 from wallkit.localize.settings import LocalizeSettings
 from wallkit.logs.sync import SyncConfig
 from wallkit.maps.fields import MapsSettings
+from wallkit.maps.rules.tolerances import Tolerances
 from wallkit.pipelines.evaluate import EvaluateSettings
 from wallkit.pipelines.recorder import ResultSettings
 from wallkit.points.filters import PointsSettings
@@ -25,6 +26,7 @@ class Config:
     map: str = setting("", "map used when --map is not given; relative to this file")
     logs: SyncConfig = section(SyncConfig, "how messages become frames")
     maps: MapsSettings = section(MapsSettings, "how maps become fields")
+    rules: Tolerances = section(Tolerances, "where the rules of `wallkit map validate` draw the line")
     points: PointsSettings = section(PointsSettings, "which returns are trusted")
     localize: LocalizeSettings = section(LocalizeSettings, "the filter")
     evaluate: EvaluateSettings = section(EvaluateSettings, "when an estimate is right or wrong")

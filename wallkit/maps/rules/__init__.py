@@ -10,14 +10,36 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from wallkit.errors import ConfigError, MapError, closest
-from wallkit.maps.rules import graph, joints, schema, values, xml_bytes
+from wallkit.maps.rules import (
+    doors,
+    fills,
+    graph,
+    joints,
+    junctions,
+    openings,
+    placement,
+    rooms,
+    scale,
+    schema,
+    shapes,
+    swings,
+    topology,
+    values,
+    ways,
+    xml_bytes,
+)
 from wallkit.maps.rules.base import Context, Rule
 from wallkit.maps.rules.docs import text_from_doc
 from wallkit.maps.rules.engine import Report, codes_matching, run
 from wallkit.maps.rules.tolerances import Tolerances
 from wallkit.maps.xml import parse
 
-_GROUPS = (xml_bytes.RULES, schema.RULES, values.RULES, graph.RULES, joints.RULES)
+_GROUPS = (
+    *(xml_bytes.RULES, schema.RULES, values.RULES, graph.RULES, joints.RULES),
+    *(scale.RULES, shapes.RULES, junctions.RULES, placement.RULES),
+    *(openings.RULES, fills.RULES, doors.RULES, swings.RULES, ways.RULES),
+    *(rooms.RULES, topology.RULES),
+)
 
 RULES: dict[str, Rule] = {rule.code: rule for group in _GROUPS for rule in sorted(group, key=lambda rule: rule.code)}
 
