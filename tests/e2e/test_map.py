@@ -290,6 +290,7 @@ def test_a_building_of_three_levels_becomes_three_maps(wallkit, data, tmp_path):
 
 @pytest.mark.data
 def test_a_drawing_in_the_wrong_unit_is_a_bad_verdict_until_the_unit_is_given(run_here, data):
+    pytest.importorskip("ezdxf", reason="the extra wallkit[dxf] is not installed")
     drawing = data / "maps/dxf/bishop_overland_floorplan.dxf"
     done = run_here("map", "import", drawing, "-o", "a.wkmap.urdf", "--dry-run", "--json")
     assert done.code == 1
