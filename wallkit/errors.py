@@ -39,6 +39,10 @@ class MapError(WallkitError):
     """A map that cannot be read or used."""
 
 
+class CalibrationError(WallkitError):
+    """A camera model, board, capture or calibration file that cannot be read or used."""
+
+
 class ConfigError(WallkitError):
     """A setting that does not exist or has an impossible value."""
 
