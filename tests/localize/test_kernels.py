@@ -13,6 +13,7 @@ from wallkit.core.types import FieldSet
 from wallkit.localize.kernels import (
     in_threads,
     rotate_drive_rotate,
+    sum_of_double_mixtures,
     sum_of_field,
     sum_of_mixtures,
 )
@@ -64,6 +65,19 @@ def test_sum_of_mixtures_is_the_log_of_each_beams_mixture(scene):
     sum_of_mixtures(placed(fields, poses), cells_from_points(fields, points), gains, floors, bordered(field), out)
     wanted = np.log(gains * looked_up(fields, field, poses, points) + floors).sum(axis=1)
     agree_but_for_edges(out, wanted, 1e-3)
+
+
+def test_sum_of_double_mixtures_adds_a_second_field(scene):
+    fields, poses, points, rng = scene
+    gains, own_gains = rng.random((2, len(points))).astype(np.float32)
+    floors = (10.0 ** rng.uniform(-9, 0, len(points))).astype(np.float32)
+    field = fields.distances_m["all"]
+    own = rng.random(field.shape).astype(np.float32)
+    out = np.zeros(len(poses))
+    args = (gains, own_gains, floors, bordered(field), bordered(own))
+    sum_of_double_mixtures(placed(fields, poses), cells_from_points(fields, points), *args, out)
+    seen = gains * looked_up(fields, field, poses, points) + own_gains * looked_up(fields, own, poses, points)
+    agree_but_for_edges(out, np.log(seen + floors).sum(axis=1), 1e-3)
 
 
 @pytest.mark.parametrize("threads", [2, 3])

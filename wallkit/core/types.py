@@ -181,12 +181,31 @@ class LabelledScan:
         weights: (K,) float32 in [0, 1]: the prior that a return comes from the map; 0 ignores it.
         labels: (K,) int64 class index into `classes`, -1 where no camera saw the point; None without a camera.
         classes: names of the classes the labels point into.
+        confidences: (K,) float32 in [0, 1], how sure each label is; None where nobody says: the labels are sure.
     """
 
     points: Points
     weights: Float32Array
     labels: Int64Array | None = None
     classes: tuple[str, ...] = ()
+    confidences: Float32Array | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class BeamLabels:
+    """What the beams of one recorded scan hit, from whoever can tell: a camera, or the simulator as an oracle.
+
+    Attributes:
+        stamp_ns: of the scan.
+        labels: (B,) int64 class index into `classes` by recorded beam (see `Points.beams`), -1 for unknown.
+        classes: names of the classes.
+        confidences: (B,) float32 in [0, 1], or None.
+    """
+
+    stamp_ns: int
+    labels: Int64Array
+    classes: tuple[str, ...]
+    confidences: Float32Array | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,6 +218,7 @@ class Frame:
         odometry: (3,) T_odom_base at stamp_ns.
         odometry_gap_s: longest time without an odometry message since the previous frame.
         image: nearest image within the tolerance, None without one.
+        labels: classes of the scan's beams, None where the log has none.
     """
 
     stamp_ns: int
@@ -206,6 +226,7 @@ class Frame:
     odometry: Float64Array
     odometry_gap_s: float = 0.0
     image: CameraImage | None = None
+    labels: BeamLabels | None = None
 
 
 @dataclass(frozen=True)

@@ -110,6 +110,29 @@ def sum_of_mixtures(placed: Any, endpoints: Any, gains: Any, floors: Any, field:
         out[i] = total * _LN2
 
 
+@njit(cache=True, fastmath=True, nogil=True)
+def sum_of_double_mixtures(
+    placed: Any, endpoints: Any, gains: Any, own_gains: Any, floors: Any, field: Any, own_field: Any, out: Any
+) -> None:
+    """out[i] = sum_k log(gains[k] * field[cell] + own_gains[k] * own_field[cell] + floors[k]), cell of endpoint k at pose i.
+
+    As `sum_of_mixtures`, with a second field of the same shape.
+    """
+    height, width = field.shape
+    flat, own = field.reshape(-1), own_field.reshape(-1)
+    x_last, y_last, row = _f4(width - 1), _f4(height - 1), np.int32(width)
+    ex, ey = endpoints[0], endpoints[1]
+    for i in range(placed.shape[1]):
+        c, s, x0, y0 = placed[0, i], placed[1, i], placed[2, i], placed[3, i]
+        total = _ZERO
+        for k in range(ex.shape[0]):
+            x = min(max(x0 + c * ex[k] - s * ey[k], _ZERO), x_last)
+            y = min(max(y0 + s * ex[k] + c * ey[k], _ZERO), y_last)
+            cell = np.uint32(np.int32(y) * row + np.int32(x))
+            total += _log2(gains[k] * flat[cell] + own_gains[k] * own[cell] + floors[k])
+        out[i] = total * _LN2
+
+
 @njit(cache=True, nogil=True)
 def rotate_drive_rotate(poses: Any, noise: Any, means: Any, sds: Any, out: Any) -> None:
     """out[i] = poses[i] turned, driven and turned by means[j] - sds[j] * noise[j, i]; see motion.DifferentialDrive."""

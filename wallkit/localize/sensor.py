@@ -17,9 +17,10 @@ from wallkit.core.geometry import compose
 from wallkit.core.grid import bordered, cells_from_points, placed, spread_of
 from wallkit.core.raycast import cast_rays
 from wallkit.core.types import FieldSet, Float32Array, Float64Array, LabelledScan
-from wallkit.localize.kernels import in_threads, sum_of_field, sum_of_mixtures
-
-_SQRT_2PI = float(np.sqrt(2.0 * np.pi))
+from wallkit.localize.class_conditional import ClassConditional
+from wallkit.localize.densities import SQRT_2PI, hit_density
+from wallkit.localize.kernels import in_threads, sum_of_field
+from wallkit.localize.per_class import PerClass
 
 
 class Likelihood(Protocol):
@@ -57,7 +58,7 @@ class LikelihoodField:
 
     def on(self, fields: FieldSet, *, threads: int = 1) -> Likelihood:
         """See SensorModel."""
-        hit = _hit_density(fields.distances_m["all"], self.sigma_m)
+        hit = hit_density(fields.distances_m["all"], self.sigma_m)
         log_field = np.log(self.z_hit * hit + np.float32(self.z_rand / self.range_max_m))
         return _FieldLikelihood(self, fields, bordered(log_field), threads)
 
@@ -76,58 +77,6 @@ class _FieldLikelihood:
         out = np.zeros(len(poses))
         args = (endpoints, scan.weights[used], self.log_field)
         in_threads(sum_of_field, placed(self.fields, poses), args, out, self.threads)
-        return self.settings.temper * out
-
-
-@dataclass(frozen=True)
-class ClassConditional:
-    """Each return is from the map or from something unknown (Akai 2023, class-conditional observation model).
-
-    log p = temper * sum_k log(pi_k N(d_k; 0, sigma) + (1 - pi_k) p_unknown(z_k)), with p_unknown(z) the exponential
-    lambda exp(-lambda z) / (1 - exp(-lambda z_max)): what is not in the map stands in front of it. The prior of beam k is
-    pi_k = known_prior * w_k, w_k from the point filters; a beam of weight 0 tells nothing about the pose.
-    """
-
-    sigma_m: float = setting(0.1, "standard deviation of a return about the mapped surface", low=0.001)
-    known_prior: float = setting(
-        0.8, "prior that a return comes from the map when no filter says otherwise", low=0, high=1
-    )
-    unknown_rate_per_m: float = setting(0.2, "lambda of the exponential of unknown returns", low=1e-6)
-    beams: int = setting(120, "returns used per update, spread over the sweep", low=1)
-    range_max_m: float = setting(25.0, "farther returns are not used", low=0.1)
-    temper: float = setting(
-        0.2, "exponent of the joint likelihood: the independent share of the beams", low=0.001, high=1
-    )
-
-    def on(self, fields: FieldSet, *, threads: int = 1) -> Likelihood:
-        """See SensorModel."""
-        return _MixtureLikelihood(
-            self, fields, bordered(_hit_density(fields.distances_m["all"], self.sigma_m)), threads
-        )
-
-    def unknown_density(self, ranges_m: Float32Array) -> Float32Array:
-        """p_unknown (K,) [1/m] of returns at the given ranges."""
-        rate = self.unknown_rate_per_m
-        return np.asarray(rate * np.exp(-rate * ranges_m) / -np.expm1(-rate * self.range_max_m), dtype=np.float32)
-
-
-@dataclass(frozen=True)
-class _MixtureLikelihood:
-    settings: ClassConditional
-    fields: FieldSet
-    hit_field: Float32Array
-    threads: int
-
-    def log_likelihood(self, poses: Float64Array, scan: LabelledScan) -> Float64Array:
-        """See Likelihood."""
-        used = spread_of(scan.points, self.settings.beams, scan.weights, range_max_m=self.settings.range_max_m)
-        endpoints = cells_from_points(self.fields, scan.points.xyz_m[used])
-        known = np.float32(self.settings.known_prior) * scan.weights[used]
-        # where a prior of 1 leaves no room for the unknown, the logarithm stays finite
-        floors = np.maximum((1 - known) * self.settings.unknown_density(scan.points.ranges_m[used]), np.float32(1e-9))
-        out = np.zeros(len(poses))
-        args = (endpoints, known, floors, self.hit_field)
-        in_threads(sum_of_mixtures, placed(self.fields, poses), args, out, self.threads)
         return self.settings.temper * out
 
 
@@ -154,7 +103,7 @@ class Beam:
     def density(self, ranges_m: Float32Array, expected_m: Float32Array, reach_m: float) -> Float64Array:
         """p(z | z*) (N, K) [1/m] of ranges (K,) against expected ranges (N, K); a range at `reach_m` is no return."""
         z, at = ranges_m[None, :].astype(np.float64), expected_m.astype(np.float64)
-        hit = np.exp(-0.5 * ((z - at) / self.sigma_m) ** 2) / (self.sigma_m * _SQRT_2PI)
+        hit = np.exp(-0.5 * ((z - at) / self.sigma_m) ** 2) / (self.sigma_m * SQRT_2PI)
         rate = self.short_rate_per_m
         short = np.where(z <= at, rate * np.exp(-rate * z) / -np.expm1(-rate * np.maximum(at, 1e-3)), 0.0)
         is_max = z >= reach_m
@@ -194,15 +143,9 @@ class _BeamLikelihood:
         return bearings, ranges.astype(np.float32), weights.astype(np.float64)
 
 
-def _hit_density(distances_m: Float32Array, sigma_m: float) -> Float32Array:
-    """N(d; 0, sigma) [1/m] in float32, 0 where it is next to nothing: denormal numbers slow the kernels fourfold."""
-    scaled = distances_m / np.float32(sigma_m)
-    density = np.exp(np.float32(-0.5) * scaled * scaled) / np.float32(sigma_m * _SQRT_2PI)
-    return np.where(density > 1e-20, density, np.float32(0.0)).astype(np.float32)
-
-
 SENSORS: dict[str, type[SensorModel]] = {
     "likelihood_field": LikelihoodField,
     "class_conditional": ClassConditional,
     "beam": Beam,
+    "per_class": PerClass,
 }

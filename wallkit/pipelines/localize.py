@@ -17,7 +17,7 @@ import numpy as np
 from wallkit.core.geometry import interpolate_poses
 from wallkit.core.grid import distances_at
 from wallkit.core.steps import Steps
-from wallkit.core.types import Estimate, Float64Array, LabelledScan, StampedPose, Trajectory
+from wallkit.core.types import Estimate, Float64Array, StampedPose, Trajectory
 from wallkit.errors import ConfigError, LogError
 from wallkit.evaluate.resources import Mark, Timers, mark_now
 from wallkit.evaluate.tum import read_tum
@@ -35,6 +35,7 @@ from wallkit.pipelines.config import Config
 from wallkit.pipelines.maps import LoadedMap, load_map
 from wallkit.pipelines.recorder import MessageWriter, Recorder
 from wallkit.points.filters import apply_filters
+from wallkit.points.labels import labelled_scan
 from wallkit.report.data import Snapshot
 
 
@@ -142,8 +143,7 @@ def localize(
             with timers.phase("filter"):
                 began = time.perf_counter_ns()
                 belief = tracker.predict(rng, belief, frame.odometry, frame.odometry_gap_s)
-                scan = LabelledScan(frame.points, np.ones(len(frame.points.ranges_m), dtype=np.float32))
-                scan = apply_filters(filters, scan, belief.estimate())
+                scan = apply_filters(filters, labelled_scan(frame), belief.estimate())
                 belief, info = tracker.update(rng, belief, scan)
                 elapsed_ms = (time.perf_counter_ns() - began) / 1e6
             estimate = belief.estimate(frame.stamp_ns)

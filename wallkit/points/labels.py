@@ -1,0 +1,23 @@
+"""A frame -> the scan that filters and sensor models work on: every return counts, and carries the label of its beam."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wallkit.core.types import Frame, LabelledScan
+
+
+def labelled_scan(frame: Frame) -> LabelledScan:
+    """The frame's returns with weight 1, and with the labels of their beams where the frame has any."""
+    points = frame.points
+    weights = np.ones(len(points.ranges_m), dtype=np.float32)
+    given = frame.labels
+    if given is None:
+        return LabelledScan(points, weights)
+    known = points.beams < len(given.labels)
+    beams = np.where(known, points.beams, 0)
+    if not len(given.labels):
+        return LabelledScan(points, weights)
+    labels = np.where(known, given.labels[beams], -1)
+    confidences = None if given.confidences is None else given.confidences[beams].astype(np.float32)
+    return LabelledScan(points, weights, labels, given.classes, confidences)
