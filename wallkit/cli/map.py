@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from wallkit.cli import common
+from wallkit.cli.map_draw import show
 from wallkit.cli.map_look import import_, info, ls
 
 if TYPE_CHECKING:
@@ -245,5 +246,5 @@ def _say_fixed(file: RepairedFile, *, dry_run: bool) -> None:
     click.echo(f"{file.path}: {len(file.fixed)} {would}, {left}{more}", err=dry_run)
 
 
-for command in (info, ls, import_):
+for command in (info, ls, show, import_):
     map_group.add_command(command)
