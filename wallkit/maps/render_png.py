@@ -31,7 +31,7 @@ def png_from_drawing(drawing: Drawing, *, pixels_per_px: float = 1.0, colours: i
     width, height = drawing.size_px
     with matplotlib.rc_context({"font.family": ["DejaVu Sans"], "text.parse_math": False}):
         figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI * pixels_per_px, facecolor="white")
-        canvas = FigureCanvasAgg(figure)
+        FigureCanvasAgg(figure)
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), frameon=False)
         axes.set_xlim(0, width)
         axes.set_ylim(height, 0)
@@ -42,7 +42,7 @@ def png_from_drawing(drawing: Drawing, *, pixels_per_px: float = 1.0, colours: i
                 order += 1
                 _draw(axes, drawing, mark, is_plan, order)
         buffer = io.BytesIO()
-        canvas.print_png(buffer, metadata={"Software": None})
+        figure.savefig(buffer, format="png", dpi="figure", metadata={"Software": None})
     return _fewer_colours(buffer.getvalue(), colours)
 
 
