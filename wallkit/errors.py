@@ -43,6 +43,10 @@ class CalibrationError(WallkitError):
     """A camera model, board, capture or calibration file that cannot be read or used."""
 
 
+class SimulationError(WallkitError):
+    """A world, robot or scenario that cannot be simulated."""
+
+
 class ConfigError(WallkitError):
     """A setting that does not exist or has an impossible value."""
 

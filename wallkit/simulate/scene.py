@@ -1,0 +1,199 @@
+"""A world -> a compiled MuJoCo scene that can be posed and asked what a ray meets; nothing here needs GL.
+
+The map's own XML never reaches MuJoCo, which would fuse links and lose their names: every solid becomes a geom whose number
+leads back to it. Nothing is simulated by forces; bodies are placed, and only kinematics is computed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from wallkit.core.types import Float64Array, Int64Array
+from wallkit.errors import SimulationError
+from wallkit.simulate.world import MAP, Light, Solid, World
+
+if TYPE_CHECKING:
+    import mujoco
+
+# geom groups, which a ray can look through one by one
+GROUPS: Mapping[Light, int] = {"opaque": 0, "glass": 1, "mirror": 2, "none": 3}
+_RAYS_SEE = ("opaque", "glass", "mirror")
+NOTHING = -1
+
+
+@dataclass(frozen=True, eq=False)
+class Hits:
+    """What rays meet first.
+
+    Attributes:
+        ranges_m: (K,) distance, inf where nothing is met. solids: (K,) index into the world's solids, NOTHING for none.
+        normals: (K, 3) unit normal of the surface on the ray's side; NaN for none.
+    """
+
+    ranges_m: Float64Array
+    solids: Int64Array
+    normals: Float64Array
+
+
+class Scene:
+    """A world that can be posed and looked at; `place` moves what can move, everything else answers for that moment.
+
+    Raises:
+        SimulationError: MuJoCo is not installed, or it does not take the world (with its message).
+    """
+
+    def __init__(self, world: World, *, spec: mujoco.MjSpec | None = None) -> None:
+        mujoco = mujoco_module()
+        self.world = world
+        try:
+            self.model = (spec or spec_from_world(world)).compile()
+        except ValueError as error:
+            raise SimulationError(
+                f"MuJoCo does not take this world: {error}", where=world.source, hint="see the named shape in the map"
+            ) from error
+        self.data = mujoco.MjData(self.model)
+        self._mocap = {body.name: int(self.model.body(body.name).mocapid[0]) for body in world.bodies}
+        self.solid_of_geom = np.full(self.model.ngeom, NOTHING, dtype=np.int64)
+        for number in range(len(world.solids)):
+            self.solid_of_geom[self.model.geom(_geom_name(number)).id] = number
+        self.place(world.poses())
+
+    def place(self, poses: Mapping[str, Float64Array]) -> None:
+        """Puts bodies (by name, T_map_body (4, 4)) where they are at one moment; the others stay.
+
+        Raises:
+            KeyError: no such body.
+        """
+        from scipy.spatial.transform import Rotation
+
+        mujoco = mujoco_module()
+        if poses:
+            rows = [self._mocap[name] for name in poses]
+            matrices = np.stack(list(poses.values()))
+            self.data.mocap_pos[rows] = matrices[:, :3, 3]
+            self.data.mocap_quat[rows] = Rotation.from_matrix(matrices[:, :3, :3]).as_quat(scalar_first=True)
+        mujoco.mj_kinematics(self.model, self.data)
+
+    def cast(self, origin: Float64Array, directions: Float64Array, *, unseen: tuple[Light, ...] = ()) -> Hits:
+        """What rays from one point (3,) along unit directions (K, 3) meet first, solids of some kinds left out."""
+        mujoco = mujoco_module()
+        count = len(directions)
+        geoms, ranges = np.full(count, NOTHING, dtype=np.int32), np.zeros(count)
+        normals = np.zeros(3 * count)
+        groups = np.zeros(6, dtype=np.uint8)
+        groups[[GROUPS[light] for light in _RAYS_SEE if light not in unseen]] = 1
+        rays = np.ascontiguousarray(directions, dtype=np.float64).ravel()
+        cutoff = 1e6
+        mujoco.mj_multiRay(
+            *(self.model, self.data, np.asarray(origin, dtype=np.float64), rays, groups, 1, -1),
+            *(geoms, ranges, normals, count, cutoff),
+        )
+        missed = (geoms == NOTHING) | (ranges < 0)
+        solids = np.where(missed, NOTHING, self.solid_of_geom[geoms])
+        normals = np.where(missed[:, None], np.nan, normals.reshape(-1, 3))
+        # towards the ray, so that a cosine of incidence is never negative
+        facing = np.sum(normals * directions, axis=1) > 0
+        normals[facing] *= -1
+        return Hits(np.where(missed, np.inf, ranges), solids, normals)
+
+    # --------------------------------------------------------------------------------------- what a solid is
+
+    @cached_property
+    def class_ids(self) -> Int64Array:
+        """(S,) of every solid, the place of its class in `world.class_names`."""
+        places = {name: number for number, name in enumerate(self.world.class_names)}
+        return np.array([places[solid.class_name] for solid in self.world.solids], dtype=np.int64)
+
+    @cached_property
+    def instance_names(self) -> tuple[str, ...]:
+        """Every thing in the world, in order of appearance."""
+        return tuple(dict.fromkeys(solid.instance for solid in self.world.solids))
+
+    @cached_property
+    def instance_ids(self) -> Int64Array:
+        """(S,) of every solid, the place of its thing in `instance_names`."""
+        places = {name: number for number, name in enumerate(self.instance_names)}
+        return np.array([places[solid.instance] for solid in self.world.solids], dtype=np.int64)
+
+    def labels(self, solids: Int64Array, of: Int64Array) -> Int64Array:
+        """Ids (K,) of hit solids (K,) by a table (S,); NOTHING where nothing was hit."""
+        return np.where(solids == NOTHING, NOTHING, of[solids])
+
+
+def spec_from_world(world: World) -> mujoco.MjSpec:
+    """The world as an MjSpec that can still be added to: flat colours, no lights."""
+    mujoco = mujoco_module()
+    spec = mujoco.MjSpec()
+    spec.modelname = world.name or "world"
+    spec.option.gravity = (0.0, 0.0, 0.0)
+    carriers = {MAP: spec.worldbody}
+    for body in world.bodies:
+        carriers[body.name] = spec.worldbody.add_body(name=body.name, mocap=True)
+    for number, solid in enumerate(world.solids):
+        _add_geom(spec, carriers[solid.body], solid, number)
+    return spec
+
+
+def mujoco_module() -> Any:
+    """The mujoco package.
+
+    Raises:
+        SimulationError: it is not installed.
+    """
+    try:
+        import mujoco
+    except ImportError as error:
+        raise SimulationError(
+            "the simulator needs MuJoCo, which is not installed", hint="pip install 'wallkit[sim]'"
+        ) from error
+    return mujoco
+
+
+# -------------------------------------------------------------------------------------------- details
+
+
+def _geom_name(number: int) -> str:
+    return f"solid{number}"
+
+
+def _add_geom(spec: mujoco.MjSpec, body: Any, solid: Solid, number: int) -> None:
+    mujoco = mujoco_module()
+    types = mujoco.mjtGeom
+    position, quaternion = _place(solid.T_body_solid)
+    common: dict[str, Any] = {
+        "name": _geom_name(number),
+        "pos": position,
+        "quat": quaternion,
+        "group": GROUPS[solid.light],
+        "contype": 0,
+        "conaffinity": 0,
+    }
+    if solid.kind == "mesh":
+        name = f"mesh{number}"
+        spec.add_mesh(
+            name=name,
+            file=str(solid.mesh),
+            scale=list(solid.size),
+            inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
+        )
+        body.add_geom(type=types.mjGEOM_MESH, meshname=name, **common)
+        return
+    size = {
+        "box": lambda s: [s[0] / 2, s[1] / 2, s[2] / 2],
+        "cylinder": lambda s: [s[0], s[1] / 2, 0.0],
+        "capsule": lambda s: [s[0], s[1] / 2, 0.0],
+        "sphere": lambda s: [s[0], 0.0, 0.0],
+    }[solid.kind](solid.size)
+    body.add_geom(type=getattr(types, f"mjGEOM_{solid.kind.upper()}"), size=size, **common)
+
+
+def _place(T: Float64Array) -> tuple[list[float], list[float]]:
+    """Position and quaternion (w first) of a transform."""
+    from scipy.spatial.transform import Rotation
+
+    return T[:3, 3].tolist(), Rotation.from_matrix(T[:3, :3]).as_quat(scalar_first=True).tolist()
