@@ -25,6 +25,7 @@ HEAVY = {
     "trimesh",
     "lxml",
     "shapely",
+    "mujoco",
 }
 # third-party modules that may be imported at the top of a file, by floor
 ALLOWED_AT_TOP = {

@@ -59,9 +59,7 @@ def world_from_map(semantic_map: SemanticMap) -> World:
         for room in semantic_map.rooms.values()
         if room.floor is not None
     )
-    return World(
-        semantic_map.name, tuple(solids), bodies, rooms, _height(solids, T_map_link), semantic_map.source
-    )
+    return World(semantic_map.name, tuple(solids), bodies, rooms, _height(solids, T_map_link), semantic_map.source)
 
 
 def _bodies(semantic_map: SemanticMap) -> tuple[Body, ...]:

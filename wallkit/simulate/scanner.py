@@ -1,8 +1,8 @@
 """A planar LiDAR on a moving robot in a scene -> sweeps as it would record them, and what every return truly came from.
 
-What a real one does wrong is modelled one by one: noise that grows with range and with grazing incidence, lost returns, spots
-that fall on two surfaces at once, glass that lets most beams through, mirrors that show a second room behind them, a plane
-that is not quite level, and a sweep that takes time while everything moves.
+What a real one does wrong is modelled one by one: noise that grows with range and with grazing incidence, lost returns,
+spots that fall on two surfaces at once, glass that lets most beams through, mirrors that show a second room behind them, a
+plane that is not quite level, and a sweep that takes time while everything moves.
 """
 
 from __future__ import annotations
@@ -59,7 +59,16 @@ def perfect(scanner: Scanner) -> Scanner:
     """The same LiDAR without any fault: what it measures is the distance."""
     from dataclasses import replace
 
-    faults = ("sigma_m", "sigma_per_m", "grazing", "bias_m", "quantum_m", "dropout", "grazing_dropout", "divergence_rad")
+    faults = (
+        "sigma_m",
+        "sigma_per_m",
+        "grazing",
+        "bias_m",
+        "quantum_m",
+        "dropout",
+        "grazing_dropout",
+        "divergence_rad",
+    )
     return replace(scanner, **dict.fromkeys(faults, 0.0))
 
 
@@ -194,9 +203,7 @@ def _by_mirror(scene: Scene, origin: Float64Array, direction: Float64Array, hits
     return np.inf
 
 
-def _measured(
-    rng: np.random.Generator, scanner: Scanner, ranges: Float64Array, cosines: Float64Array
-) -> Float64Array:
+def _measured(rng: np.random.Generator, scanner: Scanner, ranges: Float64Array, cosines: Float64Array) -> Float64Array:
     """What the driver publishes of true ranges: NaN below its least, inf where nothing came back (REP 117)."""
     slant = np.minimum(1 / np.maximum(cosines, 1e-3) - 1, 5.0)
     near = np.where(np.isfinite(ranges), ranges, 0.0)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 # geom groups, which a ray can look through one by one
 GROUPS: Mapping[Light, int] = {"opaque": 0, "glass": 1, "mirror": 2, "none": 3}
-_RAYS_SEE = ("opaque", "glass", "mirror")
+_RAYS_SEE: tuple[Light, ...] = ("opaque", "glass", "mirror")
 NOTHING = -1
 
 
