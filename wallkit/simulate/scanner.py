@@ -59,17 +59,8 @@ def perfect(scanner: Scanner) -> Scanner:
     """The same LiDAR without any fault: what it measures is the distance."""
     from dataclasses import replace
 
-    faults = (
-        "sigma_m",
-        "sigma_per_m",
-        "grazing",
-        "bias_m",
-        "quantum_m",
-        "dropout",
-        "grazing_dropout",
-        "divergence_rad",
-    )
-    return replace(scanner, **dict.fromkeys(faults, 0.0))
+    exact = replace(scanner, sigma_m=0.0, sigma_per_m=0.0, grazing=0.0, bias_m=0.0, quantum_m=0.0)
+    return replace(exact, dropout=0.0, grazing_dropout=0.0, divergence_rad=0.0)
 
 
 @dataclass(frozen=True, eq=False)
