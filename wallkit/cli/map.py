@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from wallkit.cli import common
+from wallkit.cli.map_compare import diff, fmt
 from wallkit.cli.map_draw import show
 from wallkit.cli.map_look import import_, info, ls
 
@@ -246,5 +247,5 @@ def _say_fixed(file: RepairedFile, *, dry_run: bool) -> None:
     click.echo(f"{file.path}: {len(file.fixed)} {would}, {left}{more}", err=dry_run)
 
 
-for command in (info, ls, show, import_):
+for command in (info, ls, show, fmt, diff, import_):
     map_group.add_command(command)
