@@ -18,7 +18,9 @@ from wallkit.core.types import Float64Array
 from wallkit.errors import CalibrationError, closest
 
 KINDS = ("chessboard", "charuco", "aprilgrid")
-_SPELLING = "chessboard:9x6:0.025, charuco:5x7:0.04:0.03:5X5_100, aprilgrid:6x6:0.05:0.015:APRILTAG_36H11, or a TOML file"
+_SPELLING = (
+    "chessboard:9x6:0.025, charuco:5x7:0.04:0.03:5X5_100, aprilgrid:6x6:0.05:0.015:APRILTAG_36H11, or a TOML file"
+)
 # what `columns` and `rows` count, and which lengths a kind has beside square_m
 _COUNTED = {"chessboard": "corners", "charuco": "squares", "aprilgrid": "tags"}
 _LENGTHS = {"chessboard": ("square_m",), "charuco": ("square_m", "marker_m"), "aprilgrid": ("square_m", "gap_m")}
@@ -94,7 +96,7 @@ class Board:
             tag = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]) * self.square_m
             return (cells[:, None] * (self.square_m + self.gap_m) + tag).reshape(-1, 3)
         first = 1 if self.kind == "charuco" else 0
-        return (cells + (first, first, 0)) * self.square_m
+        return np.asarray((cells + np.array([first, first, 0])) * self.square_m)
 
     @property
     def pattern_box(self) -> tuple[Float64Array, Float64Array]:
@@ -155,7 +157,15 @@ def board_from(words: str) -> Board:
         raise CalibrationError(f"'{words}' is no board", hint=f"write it as {_SPELLING}")
     values = {name: _number(text, words) for name, text in zip(lengths, parts[1:], strict=False)}
     dictionary = "" if kind == "chessboard" else parts[-1].upper().removeprefix("DICT_")
-    return Board(kind, int(columns), int(rows), dictionary=dictionary, **values)
+    return Board(
+        kind,
+        int(columns),
+        int(rows),
+        values["square_m"],
+        marker_m=values.get("marker_m", 0.0),
+        gap_m=values.get("gap_m", 0.0),
+        dictionary=dictionary,
+    )
 
 
 def _number(text: str, words: str) -> float:
@@ -174,7 +184,9 @@ def _from_file(path: Path) -> Board:
         raise CalibrationError(f"is no TOML: {error}", where=path) from error
     table = document.get("board")
     if not isinstance(table, dict):
-        raise CalibrationError("has no [board] table", where=path, hint="`wallkit calib board` prints one with the sheet")
+        raise CalibrationError(
+            "has no [board] table", where=path, hint="`wallkit calib board` prints one with the sheet"
+        )
     try:
         return board_from_table(table)
     except CalibrationError as error:
@@ -204,12 +216,15 @@ def board_from_table(table: Mapping[str, Any]) -> Board:
     for key in _LENGTHS[kind]:
         if not isinstance(table[key], (int, float)) or isinstance(table[key], bool):
             raise CalibrationError(f"[board] {key} = {table[key]!r} is no length [m]")
+    lengths = {key: float(table[key]) for key in _LENGTHS[kind]}
     dictionary = str(table.get("dictionary", "")).upper().removeprefix("DICT_")
     return Board(
         kind,
         counts[0],
         counts[1],
-        **{key: float(table[key]) for key in _LENGTHS[kind]},
+        lengths["square_m"],
+        marker_m=lengths.get("marker_m", 0.0),
+        gap_m=lengths.get("gap_m", 0.0),
         dictionary=dictionary,
         is_legacy=bool(table.get("legacy", False)),
         plate_m=_pair(table, "plate_m"),

@@ -7,6 +7,7 @@ stops after 30 iterations, has no robust loss, and its fisheye half differs betw
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -64,7 +65,7 @@ def adjust(
     """
     fit, damping = _judged(start.camera, start.poses, seen, huber_px), 1e-3
     for iteration in range(1, max_iterations + 1):
-        system = _normal_equations(fit, seen, free)
+        system = normal_equations(fit, seen, free)
         while True:
             tried = _stepped(fit, seen, system, free, damping, huber_px)
             if tried is not None and tried.cost <= fit.cost:
@@ -100,10 +101,11 @@ class System:
         gain = np.linalg.solve(bounded, np.swapaxes(self.cv, 1, 2))
         scores = self.gc - np.einsum("gpv,gv->gp", np.swapaxes(gain, 1, 2), self.gv)
         schur = self.cc + damping * self.cc * np.eye(len(self.cc)) - (self.cv @ gain).sum(axis=0)
-        return schur, scores, gain
+        return np.asarray(schur), np.asarray(scores), np.asarray(gain)
 
 
-def _normal_equations(fit: Fit, seen: Observations, free: BoolArray) -> System:
+def normal_equations(fit: Fit, seen: Observations, free: BoolArray) -> System:
+    """The weighted normal equations at a fit, for its next step or its covariance."""
     by_camera, by_pose = jacobians(fit.camera, fit.poses, seen)
     by_camera, starts, w = by_camera[:, :, free], seen.starts, fit.weights[:, None, None]
 
@@ -118,11 +120,6 @@ def _normal_equations(fit: Fit, seen: Observations, free: BoolArray) -> System:
         summed(by_camera, e)[:, :, 0],
         summed(by_pose, e)[:, :, 0],
     )
-
-
-def normal_equations(fit: Fit, seen: Observations, free: BoolArray) -> System:
-    """The normal equations at a fit, for its covariance."""
-    return _normal_equations(fit, seen, free)
 
 
 def jacobians(camera: Camera, poses: Float64Array, seen: Observations) -> tuple[Float64Array, Float64Array]:
@@ -201,7 +198,7 @@ def first_fit(camera: Camera, seen: Observations) -> Fit | None:
         return None
     xy = rays[:, :2] / rays[:, 2:]
     bounds = [*seen.starts.tolist(), len(xy)]
-    poses = np.stack([_pose(seen.points[a:b, :2], xy[a:b]) for a, b in zip(bounds[:-1], bounds[1:], strict=True)])
+    poses = np.stack([_pose(seen.points[a:b, :2], xy[a:b]) for a, b in itertools.pairwise(bounds)])
     return _judged(camera, poses, seen, np.inf)
 
 

@@ -43,8 +43,8 @@ def find_corners(grey: UInt8Array, board: Board, *, half_window: int | None = No
         half_window: of the sub-pixel refinement [px]; None: 0.3 of the smallest corner spacing, 2 to 11 (a ChArUco
             board's detector has a like rule of its own, and an AprilGrid's fits lines to the edges).
 
-    A chessboard is found whole or not at all: first by OpenCV's classic search, which is fast and on its own samples the more
-    exact after refinement, then by the slower sector-based one (Duda & Frese, BMVC 2018), which sees through blur.
+    A chessboard is found whole or not at all: first by OpenCV's classic search, which is fast and on its own samples the
+    more exact after refinement, then by the slower sector-based one (Duda & Frese, BMVC 2018), which sees through blur.
     """
     found = _FINDERS[board.kind](grey, board)
     if found is None or len(found[0]) < _FEWEST_CORNERS:
@@ -63,7 +63,7 @@ def find_roughly(grey: UInt8Array, board: Board, *, width: int = 400) -> Float64
     import cv2
 
     step = max(1, round(grey.shape[1] / width))
-    small = cv2.resize(grey, None, fx=1 / step, fy=1 / step, interpolation=cv2.INTER_AREA) if step > 1 else grey
+    small: Any = cv2.resize(grey, None, fx=1 / step, fy=1 / step, interpolation=cv2.INTER_AREA) if step > 1 else grey
     found = _FINDERS[board.kind](small, board) if board.kind != "chessboard" else _classic(small, board, fast=True)
     if found is None or len(found[0]) < _FEWEST_CORNERS:
         return None

@@ -6,6 +6,7 @@ import click
 
 import wallkit
 from wallkit.cli.bench import bench
+from wallkit.cli.calib import calib
 from wallkit.cli.common import CONTEXT, WallkitGroup
 from wallkit.cli.config import completion, config
 from wallkit.cli.demo import demo
@@ -31,5 +32,5 @@ def main() -> None:
     """
 
 
-for command in (demo, log, map_group, localize, evaluate, compare, report, bench, config, completion, doctor):
+for command in (demo, log, map_group, calib, localize, evaluate, compare, report, bench, config, completion, doctor):
     main.add_command(command)

@@ -179,6 +179,7 @@ def fix(
       wallkit map fix maps/*.urdf --select S023,S024 --fix moderate
     """
     from wallkit.pipelines import map as pipeline
+    from wallkit.pipelines.outputs import write_whole
 
     if kind == "risky" and not dry_run:
         raise click.UsageError("risky repairs are only shown: add --dry-run, and make those you want by hand")
@@ -188,7 +189,7 @@ def fix(
         if dry_run:
             click.echo(file.patch, nl=False)
         elif file.after != file.before:
-            pipeline.write_whole(file.path, file.after)
+            write_whole(file.path, file.after)
         _say_fixed(file, dry_run=dry_run)
     ctx.exit(common.OK if all(file.judged.is_good for file in repaired) else common.FAILED_CHECK)
 

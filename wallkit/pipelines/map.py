@@ -11,13 +11,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from wallkit.errors import MapError, OutputError
+from wallkit.errors import MapError
 from wallkit.maps.judged import Judged
 from wallkit.maps.repair import repair
 from wallkit.maps.rules import PROFILES, validate
 from wallkit.maps.rules.base import FixClass, MapFinding
 from wallkit.maps.rules.tolerances import Tolerances
 from wallkit.maps.xml import parse
+from wallkit.pipelines.outputs import write_whole
 
 SUFFIX = ".wkmap.urdf"
 
@@ -178,24 +179,6 @@ def unified_diff(before: bytes, after: bytes, name: str) -> str:
     old, new = ([f"{line}\n" for line in lines[:-1]] + lines[-1:] * bool(lines[-1]) for lines in (old, new))
     lines = difflib.unified_diff(old, new, f"a/{name}", f"b/{name}")
     return "".join(line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n" for line in lines)
-
-
-def write_whole(path: Path, data: bytes) -> None:
-    """Replace a file in one step, keeping its permissions; a link stays a link.
-
-    Raises:
-        OutputError: it cannot be written.
-    """
-    target = path.resolve()
-    working = target.with_name(f".{target.name}.partial-{os.getpid()}")
-    try:
-        working.write_bytes(data)
-        if target.exists():
-            working.chmod(target.stat().st_mode)
-        working.replace(target)
-    except OSError as error:
-        working.unlink(missing_ok=True)
-        raise OutputError(f"cannot be written: {error.strerror}", where=path, hint="choose another place") from error
 
 
 # ------------------------------------------------------------------------------------------------ details

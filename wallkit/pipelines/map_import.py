@@ -9,7 +9,8 @@ from wallkit.errors import Finding, MapError, OutputError
 from wallkit.maps.draft import Draft
 from wallkit.maps.draft_write import write_draft
 from wallkit.maps.importers import ImportOptions, import_map
-from wallkit.pipelines.map import SUFFIX, write_whole
+from wallkit.pipelines.map import SUFFIX
+from wallkit.pipelines.outputs import write_whole
 
 
 @dataclass(frozen=True)

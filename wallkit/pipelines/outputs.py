@@ -1,4 +1,4 @@
-"""A folder of results that is either whole or not there."""
+"""Files and folders of results that are either whole or not there."""
 
 from __future__ import annotations
 
@@ -53,3 +53,35 @@ def result_folder(out: Path, *, overwrite: bool) -> Iterator[Path]:
         shutil.rmtree(old)
     else:
         working.rename(out)
+
+
+def check_file_out(out: Path, *, overwrite: bool) -> None:
+    """Refuse a file that is there already, or a place that cannot be written.
+
+    Raises:
+        OutputError: it exists (without overwrite), is a folder, or its folder is not there.
+    """
+    if out.is_dir():
+        raise OutputError("is a folder, not a file", where=out, hint="give the name of a file")
+    if out.exists() and not overwrite:
+        raise OutputError("exists", where=out, hint="choose another --out, or pass --overwrite to replace it")
+    if not out.absolute().parent.is_dir():
+        raise OutputError("cannot be written: its folder does not exist", where=out, hint=f"mkdir -p {out.parent}")
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Replace a file in one step, keeping its permissions; a link stays a link.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    target = path.resolve()
+    working = target.with_name(f".{target.name}.partial-{os.getpid()}")
+    try:
+        working.write_bytes(data)
+        if target.exists():
+            working.chmod(target.stat().st_mode)
+        working.replace(target)
+    except OSError as error:
+        working.unlink(missing_ok=True)
+        raise OutputError(f"cannot be written: {error.strerror}", where=path, hint="choose another place") from error

@@ -1,0 +1,17 @@
+"""`wallkit calib`: the words that can follow."""
+
+from __future__ import annotations
+
+import click
+
+from wallkit.cli.calib_board import board
+from wallkit.cli.calib_convert import convert
+
+
+@click.group()
+def calib() -> None:
+    """Calibrate cameras and the place of a LiDAR to them, and say how far the result may be trusted."""
+
+
+for command in (board, convert):
+    calib.add_command(command)
