@@ -18,7 +18,7 @@ from wallkit.maps.rules import PROFILES, validate
 from wallkit.maps.rules.base import FixClass, MapFinding
 from wallkit.maps.rules.tolerances import Tolerances
 from wallkit.maps.xml import parse
-from wallkit.pipelines.outputs import write_whole
+from wallkit.pipelines.outputs import write_whole as write_whole
 
 SUFFIX = ".wkmap.urdf"
 

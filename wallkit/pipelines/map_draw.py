@@ -9,7 +9,8 @@ from wallkit.maps.model import SemanticMap
 from wallkit.maps.read import load_map
 from wallkit.maps.render import PlanSettings, draw_plan
 from wallkit.maps.rules.base import MapFinding
-from wallkit.pipelines.map import Selection, judge, write_whole
+from wallkit.pipelines.map import Selection, judge
+from wallkit.pipelines.outputs import write_whole
 
 SUFFIXES = (".svg", ".png")
 # the colours of a floor plan are few; 64 keep the edges of letters smooth
