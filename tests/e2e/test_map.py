@@ -10,7 +10,9 @@ import pytest
 
 from tests.e2e.conftest import Done
 from tests.maps.drawn import box, placed, robot
+from tests.maps.flat import flat_draft
 from wallkit.cli.app import main
+from wallkit.maps.draft_write import write_draft
 
 HEADER = '<wk:map format="1.0" units="m rad" level="1" scan_plane="0.3">{}</wk:map>'
 ROOM = '<wk:room id="hall" kind="hall" floor="0 0 4 0 4 3 0 3"/>'
@@ -315,3 +317,72 @@ def test_no_faulty_file_brings_a_traceback(wallkit, data):
     assert (done.code, done.err) == (1, "")
     assert [row["file"] for row in done.json["files"]] == [str(path) for path in files]
     assert json.loads(done.out)["findings"]
+
+
+# ------------------------------------------------------------------------------------------------------ export
+
+
+@pytest.fixture
+def flat_here(here):
+    (here / "flat.wkmap.urdf").write_bytes(write_draft(flat_draft()))
+    return here
+
+
+def test_export_writes_whole_files_and_says_what_is_lost(wallkit, flat_here):
+    dry = wallkit("map", "export", "flat.wkmap.urdf", "-o", "out/flat.yaml", "--dry-run")
+    assert (dry.code, dry.err) == (0, "")
+    assert "would write out/flat.pgm" in dry.out.replace("\\", "/")
+    assert not (flat_here / "out").exists()
+    done = wallkit("map", "export", "flat.wkmap.urdf", "-o", "out/flat.yaml", "--doors", "open", "--json")
+    assert done.code == 0
+    assert sorted(path.name for path in (flat_here / "out").iterdir()) == ["flat.pgm", "flat.yaml"]
+    assert [note["code"] for note in done.json["notes"]] == ["export.wrote", "export.taken", "export.lost"]
+    assert {file["bytes"] for file in done.json["files"]} == {p.stat().st_size for p in (flat_here / "out").iterdir()}
+
+
+@pytest.mark.parametrize("out", ["a.yaml", "a.urdf", "a.geojson", "a.sdf", "a.building.yaml"])
+def test_export_replaces_only_what_it_is_told_to(run_here, flat_here, out):
+    words = ("map", "export", "flat.wkmap.urdf", "-o", out)
+    assert run_here(*words).code == 0
+    before = (flat_here / out).read_bytes()
+    again = run_here(*words)
+    assert (again.code, again.err.count("exists")) == (2, 1)
+    assert run_here(*words, "--overwrite").code == 0
+    assert (flat_here / out).read_bytes() == before
+    assert not list(flat_here.glob(".*partial*"))
+
+
+def test_export_of_fields_keeps_to_its_folder(run_here, flat_here):
+    words = ("map", "export", "flat.wkmap.urdf", "-o", "fields", "--format", "fields", "--resolution", "0.1")
+    assert run_here(*words).code == 0
+    assert {"fields.npz", "fields.json", "all.png", "door.png"} <= {p.name for p in (flat_here / "fields").iterdir()}
+    # at 1.5 m there is no toilet: its old picture goes
+    assert (flat_here / "fields/toilet.png").exists()
+    assert run_here(*words, "--z", "1.5", "--overwrite").code == 0
+    assert not (flat_here / "fields/toilet.png").exists()
+    (flat_here / "fields/notes.txt").write_text("mine")
+    refused = run_here(*words, "--overwrite")
+    assert refused.code == 2
+    assert "notes.txt" in refused.err
+    assert (flat_here / "fields/notes.txt").read_text() == "mine"
+
+
+def test_export_says_what_it_cannot_do(run_here, flat_here):
+    (flat_here / "file").write_text("")
+    (flat_here / "broken.urdf").write_text("<robot>")
+    for words, says in (
+        (("flat.wkmap.urdf",), "say where to"),
+        (("flat.wkmap.urdf", "-o", "flat"), "its suffix does not tell the format"),
+        (("flat.wkmap.urdf", "-o", "a.yaml", "--format", "xls"), "there is no exporter 'xls'"),
+        (("flat.wkmap.urdf", "-o", "flat.wkmap.urdf", "--overwrite"), "is the map itself"),
+        (("flat.wkmap.urdf", "-o", "a.sdf", "--z", "0.3"), "no use for --z"),
+        (("flat.wkmap.urdf", "-o", "a.yaml", "--z", "7"), "nothing of the map is cut at 7 m"),
+        (("flat.wkmap.urdf", "-o", "file", "--format", "fields"), "is a file"),
+        (("flat.wkmap.urdf", "-o", "file/a.sdf"), "cannot be written"),
+        (("missing.urdf", "-o", "a.sdf"), "cannot read the map"),
+        (("broken.urdf", "-o", "a.sdf"), "WK-X001"),
+    ):
+        done = run_here("map", "export", *words)
+        assert done.code == 2, words
+        assert says in done.err, (words, done.err)
+        assert "Traceback" not in done.err

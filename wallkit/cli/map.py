@@ -11,6 +11,7 @@ import click
 from wallkit.cli import common
 from wallkit.cli.map_compare import diff, fmt
 from wallkit.cli.map_draw import show
+from wallkit.cli.map_export import export
 from wallkit.cli.map_look import import_, info, ls
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ selection_options = common.options(
 
 @click.group("map")
 def map_group() -> None:
-    """Judge, repair, look into and import semantic maps (URDF with walls, doors, rooms and fixtures)."""
+    """Judge, repair, look into, import and export semantic maps (URDF with walls, doors, rooms and fixtures)."""
 
 
 @map_group.command()
@@ -248,5 +249,5 @@ def _say_fixed(file: RepairedFile, *, dry_run: bool) -> None:
     click.echo(f"{file.path}: {len(file.fixed)} {would}, {left}{more}", err=dry_run)
 
 
-for command in (info, ls, show, fmt, diff, import_):
+for command in (info, ls, show, fmt, diff, import_, export):
     map_group.add_command(command)

@@ -21,18 +21,16 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from wallkit.core.types import BoolArray, FieldSet, Float32Array, Float64Array, OccupancyGrid
+from wallkit.core.types import FieldSet, Float32Array, Float64Array, OccupancyGrid
 from wallkit.errors import MapError
+from wallkit.maps.lattice import Lattice, lattice_around
 from wallkit.maps.model import SemanticMap
-from wallkit.maps.surfaces import Floor, Surfaces, floor_at, surfaces_at
+from wallkit.maps.surfaces import Surfaces, floor_at, surfaces_at
 
 # the sensor models' own default; with another sigma s a probability p works as p^(SIGMA_M^2 / s^2)
 SIGMA_M = 0.1
 COUNTS_IN_FULL = 0.5
 MARGIN_M = 1.0
-# a floor of 150 m x 150 m at 2.5 cm; beyond it a larger cell is wanted
-MOST_CELLS = 36_000_000
-_INDOORS_STEP_M = 0.2
 _BLOCK, _TILE = 256, 16
 # rays end where the distance is below half a cell (core.raycast); a surface through a cell's corner is up to 0.71 away
 _STOPS_RAYS = 0.49
@@ -72,21 +70,10 @@ def fields_from_map(
     floor = floor_at(semantic_map, z_m)
     surfaces = surfaces_at(semantic_map, floor)
     ends = floor.cut.segments.reshape(-1, 2)
-    low = np.floor((ends.min(axis=0) - MARGIN_M) / cell_m) * cell_m
-    columns, rows = (int(n) for n in np.ceil((ends.max(axis=0) + MARGIN_M - low) / cell_m))
-    if rows * columns > MOST_CELLS:
-        fitting_m = cell_m * math.sqrt(rows * columns / MOST_CELLS)
-        raise MapError(
-            f"{columns * cell_m:.0f} m x {rows * cell_m:.0f} m in cells of {cell_m:g} m are {rows * columns:,} cells, "
-            f"more than {MOST_CELLS:,}",
-            where=semantic_map.source,
-            hint=f"if its lengths are metres (`wallkit map validate {semantic_map.source}` tells), "
-            f"--set maps.cell_m={math.ceil(fitting_m * 1000) / 1000:g}",
-        )
-    lattice = _Lattice(low, cell_m, rows, columns)
+    lattice = lattice_around(ends, cell_m, margin_m=MARGIN_M, source=semantic_map.source, flag="--set maps.cell_m=")
     solid = lattice.drawn(floor.cut.polygons)
     is_free = lattice.floor(floor) & ~solid
-    origin = np.array([*low, 0.0])
+    origin = lattice.origin
     distances = _Distances(surfaces, lattice, sigma_m)
     cells = np.where(solid, 100, np.where(is_free, 0, -1)).astype(np.int8)
     source = semantic_map.source
@@ -115,7 +102,7 @@ def distances_to_segments(
 class _Distances(Mapping[str, Float32Array]):
     """The distance fields by class, "all" first; each is computed once, when it is asked for."""
 
-    def __init__(self, surfaces: Surfaces, lattice: _Lattice, sigma_m: float) -> None:
+    def __init__(self, surfaces: Surfaces, lattice: Lattice, sigma_m: float) -> None:
         self._surfaces, self._lattice, self._sigma_m = surfaces, lattice, sigma_m
         self._drawn: dict[str, Float32Array] = {}
 
@@ -144,40 +131,6 @@ class _Distances(Mapping[str, Float32Array]):
         extra_m = np.where(p >= COUNTS_IN_FULL, 0.0, self._sigma_m * np.sqrt(-2.0 * np.log(np.minimum(p, 1.0))))
         at = self._lattice
         return distances_to_segments(segments, extra_m, at.low, at.cell_m, (at.rows, at.columns))
-
-
-@dataclass(frozen=True, eq=False)
-class _Lattice:
-    """The cells of the fields: corner of cell (0, 0) in frame map, side, and how many."""
-
-    low: Float64Array
-    cell_m: float
-    rows: int
-    columns: int
-
-    def drawn(self, polygons: Any) -> BoolArray:
-        """The cells (H, W) that polygons touch, holes left open."""
-        import cv2
-        import shapely
-
-        picture = np.zeros((self.rows, self.columns), dtype=np.uint8)
-        # OpenCV's whole numbers are pixel centres; 1/256 pixel is finer than any map is known
-        for polygon in polygons:
-            rings = [shapely.get_coordinates(ring) for ring in (polygon.exterior, *polygon.interiors)]
-            pixels = [np.rint(((ring - self.low) / self.cell_m - 0.5) * 256).astype(np.int32) for ring in rings]
-            cv2.fillPoly(picture, pixels, (1,), shift=8)
-        return np.asarray(picture > 0)
-
-    def floor(self, floor: Floor) -> BoolArray:
-        """The cells (H, W) of floor a robot may be on; outside of closed rooms asked every 0.2 m."""
-        free = self.drawn([*floor.regions, *floor.rooms])
-        every = max(1, round(_INDOORS_STEP_M / self.cell_m))
-        row, column = np.mgrid[every // 2 : self.rows : every, every // 2 : self.columns : every]
-        centres = self.low + (np.column_stack([column.ravel(), row.ravel()]) + 0.5) * self.cell_m
-        asked = floor.holds(centres).reshape(row.shape)
-        blocks = asked.repeat(every, axis=0).repeat(every, axis=1)[: self.rows, : self.columns]
-        missing = ((0, self.rows - blocks.shape[0]), (0, self.columns - blocks.shape[1]))
-        return np.asarray(free | np.pad(blocks, missing, mode="edge"))
 
 
 def _height_m(semantic_map: SemanticMap, given_m: float | None) -> float:
