@@ -340,7 +340,7 @@ def test_export_writes_whole_files_and_says_what_is_lost(wallkit, flat_here):
     assert {file["bytes"] for file in done.json["files"]} == {p.stat().st_size for p in (flat_here / "out").iterdir()}
 
 
-@pytest.mark.parametrize("out", ["a.yaml", "a.urdf", "a.geojson", "a.sdf", "a.building.yaml"])
+@pytest.mark.parametrize("out", ["a.yaml", "a.urdf", "a.svg", "a.geojson", "a.sdf", "a.building.yaml"])
 def test_export_replaces_only_what_it_is_told_to(run_here, flat_here, out):
     words = ("map", "export", "flat.wkmap.urdf", "-o", out)
     assert run_here(*words).code == 0

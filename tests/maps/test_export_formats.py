@@ -113,6 +113,14 @@ def test_what_a_format_cannot_say_is_counted_in_words():
     assert lost("urdf") is None
 
 
+def test_the_drawing_is_the_one_that_map_show_makes():
+    from wallkit.maps.render import PlanSettings, plan_svg
+
+    (data,) = export_map(flat(), Path("a.svg"), ExportOptions(z_m=0.3)).files.values()
+    assert data == plan_svg(flat(), PlanSettings(z_m=0.3))
+    assert data != plan_svg(flat())
+
+
 def test_importers_and_exporters_share_their_names():
     assert {"rmf", "pgm"} <= set(EXPORTERS) & set(IMPORTERS)
 

@@ -53,7 +53,7 @@ def test_walls_meet_at_their_axes_and_the_door_is_a_gap(tmp_path):
     assert {wall.height_m for wall in draft.walls if not wall.openings} == {2.6}
     assert draft.level == "L1"
     assert draft.elevation_m == 3.2
-    (start, end, door) = doors(draft)["leaf"]
+    start, end, _ = doors(draft)["leaf"]
     assert (start, end) == ((m, 1.0), (m, 1.9))
     toilet = next(fixture for fixture in draft.fixtures if fixture.class_name == "toilet")
     # the importer stands a toilet with its back to the wall beside it: where it was

@@ -12,6 +12,7 @@ from wallkit.maps.exporters.geojson import export_geojson
 from wallkit.maps.exporters.pgm import export_pgm
 from wallkit.maps.exporters.rmf import export_rmf
 from wallkit.maps.exporters.sdf import export_sdf
+from wallkit.maps.exporters.svg import export_svg
 from wallkit.maps.exporters.urdf import export_urdf
 from wallkit.maps.model import SemanticMap
 
@@ -63,6 +64,7 @@ EXPORTERS: dict[str, Exporter] = {
     "pgm": Exporter(export_pgm, (".yaml", ".pgm"), frozenset({"z_m", "cell_m", "doors", "is_solid"})),
     "fields": Exporter(export_fields, (), frozenset({"z_m", "cell_m"}), is_folder=True),
     "urdf": Exporter(export_urdf, (".urdf",)),
+    "svg": Exporter(export_svg, (".svg",), frozenset({"z_m"})),
     "geojson": Exporter(export_geojson, (".geojson",), frozenset({"z_m", "doors", "crs"})),
     "sdf": Exporter(export_sdf, (".sdf",), frozenset({"doors"})),
     "rmf": Exporter(export_rmf, (".building.yaml",)),
