@@ -7,11 +7,15 @@ from pathlib import Path
 import click
 
 from wallkit.cli import common
+from wallkit.cli.bench_covariance import covariance
 
 
 @click.group()
 def bench() -> None:
-    """Measure speed; results belong in docs/benchmarks with the command that made them."""
+    """Measure speed and honesty; results belong in docs/benchmarks with the command that made them."""
+
+
+bench.add_command(covariance)
 
 
 def _sizes(_: click.Context, __: click.Parameter, value: str) -> tuple[int, ...]:

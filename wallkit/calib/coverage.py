@@ -1,0 +1,82 @@
+"""Worlds with a known transform -> how often each unknown lies in the interval that is reported for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wallkit.calib.covariance import quantiles
+from wallkit.calib.sightings import Sighting, problem_from_sightings
+from wallkit.calib.solver import difference, fit
+from wallkit.calib.worlds import World, draw_sightings, mounting
+from wallkit.core.types import Float64Array
+
+LEVEL = 0.95
+LOWEST, HIGHEST = 0.92, 0.98
+
+
+@dataclass(frozen=True, eq=False)
+class Coverage:
+    """One row of the table.
+
+    Attributes:
+        covered: (6,) share of the seeds in which roll, pitch, yaw, forward, left, height lay in their 95 % interval.
+        predicted: (6,) the same with the sigma that the declared noise promises and the normal quantile.
+        naive: (6,) the same with (J'J)^-1 s^2 over points, as tools commonly report.
+        sigma: (6,) median clustered sigma [rad, m]. degrees: (6,) mean degrees of freedom.
+    """
+
+    sensor: str
+    views: int
+    seeds: int
+    excess: float
+    covered: Float64Array
+    predicted: Float64Array
+    naive: Float64Array
+    sigma: Float64Array
+    degrees: Float64Array
+
+    @property
+    def is_honest(self) -> bool:
+        """Whether every unknown is covered 92 to 98 times of 100, give or take two standard errors of so many seeds."""
+        slack = 2 * np.sqrt(LEVEL * (1 - LEVEL) / self.seeds) if self.seeds < 500 else 0.0
+        return bool((self.covered >= LOWEST - slack).all() and (self.covered <= HIGHEST + slack).all())
+
+
+def coverage(world: World, views: int, seeds: int, *, done: Callable[[int], None] | None = None) -> Coverage:
+    """Coverage over seeds 0, 1, ... of one kind of world, each with a mounting and boards of its own."""
+    hits, predicted, naive = np.zeros(6), np.zeros(6), np.zeros(6)
+    sigmas, degrees = [], []
+    for seed in range(seeds):
+        rng = np.random.default_rng(seed)
+        T = mounting(rng)
+        sightings = draw_sightings(rng, world, T, views)
+        problem = problem_from_sightings(sightings)
+        found = fit(problem, T)
+        spread = found.spread()
+        # the truth as seen from the estimate, in the axes that the intervals are in
+        off = np.abs(difference(found.T, T))
+        hits += off <= spread.half_widths(LEVEL)
+        predicted += off <= quantiles(np.full(6, np.inf), LEVEL) * np.sqrt(np.diag(spread.predicted))
+        naive += off <= quantiles(np.full(6, np.inf), LEVEL) * _naive_sigmas(sightings, found.T)
+        sigmas.append(spread.sigmas)
+        degrees.append(spread.degrees)
+        if done is not None:
+            done(seed + 1)
+    name = "2D" if world.is_planar else "3D"
+    shares = (hits / seeds, predicted / seeds, naive / seeds)
+    return Coverage(name, views, seeds, world.excess, *shares, np.median(sigmas, axis=0), np.mean(degrees, axis=0))
+
+
+def _naive_sigmas(sightings: Sequence[Sighting], T: Float64Array) -> Float64Array:
+    """(6,) of (J'J)^-1 s^2 over all points of all boards, in LiDAR axes."""
+    rows, off = [], []
+    for sighting in sightings:
+        turned = sighting.points_m @ T[:3, :3].T
+        n = np.broadcast_to(sighting.board.normal, turned.shape)
+        rows.append(np.concatenate([np.cross(turned, n) @ T[:3, :3], n @ T[:3, :3]], axis=1))
+        off.append((turned + T[:3, 3]) @ sighting.board.normal - sighting.board.distance_m)
+    J, r = np.concatenate(rows), np.concatenate(off)
+    return np.sqrt(np.diag(np.linalg.inv(J.T @ J)) * (r @ r) / (len(r) - 6))
