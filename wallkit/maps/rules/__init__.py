@@ -18,6 +18,8 @@ from wallkit.maps.rules import (
     junctions,
     openings,
     placement,
+    portability,
+    references,
     rooms,
     scale,
     schema,
@@ -39,6 +41,7 @@ _GROUPS = (
     *(scale.RULES, shapes.RULES, junctions.RULES, placement.RULES),
     *(openings.RULES, fills.RULES, doors.RULES, swings.RULES, ways.RULES),
     *(rooms.RULES, topology.RULES),
+    *(portability.RULES, references.RULES),
 )
 
 RULES: dict[str, Rule] = {rule.code: rule for group in _GROUPS for rule in sorted(group, key=lambda rule: rule.code)}

@@ -36,7 +36,7 @@ PREREQUISITES: Mapping[str, str] = {
     "T": "XSGE",
     "C": "XSGE",
     "L": "XSGEOTC",
-    "P": "XS",
+    "P": "X",
 }
 
 
