@@ -10,7 +10,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from wallkit.errors import ConfigError, MapError, closest
+from wallkit.maps.labels import Labels
 from wallkit.maps.rules import (
+    cells,
     doors,
     fills,
     graph,
@@ -24,9 +26,12 @@ from wallkit.maps.rules import (
     scale,
     schema,
     shapes,
+    slices,
     swings,
+    taxonomy,
     topology,
     values,
+    vocabulary,
     ways,
     xml_bytes,
 )
@@ -41,6 +46,8 @@ _GROUPS = (
     *(scale.RULES, shapes.RULES, junctions.RULES, placement.RULES),
     *(openings.RULES, fills.RULES, doors.RULES, swings.RULES, ways.RULES),
     *(rooms.RULES, topology.RULES),
+    *(taxonomy.RULES, vocabulary.RULES),
+    *(slices.RULES, cells.RULES),
     *(portability.RULES, references.RULES),
 )
 
@@ -67,6 +74,7 @@ def validate(
     ignore: Sequence[str] = (),
     source: str = "map",
     in_set: bool = False,
+    labels: Labels | None = None,
     today: datetime.date | None = None,
 ) -> Report:
     """Everything the rules have to say about a map file or its bytes.
@@ -76,6 +84,7 @@ def validate(
             groups it builds on hold.
         source: name for messages, for bytes; meshes are looked for beside it.
         in_set: the file is one level of several.
+        labels: of the segmentation model, by id.
         today: inline ignores that ended before it no longer count.
 
     Raises:
@@ -93,7 +102,7 @@ def validate(
         data = file
     selected = codes_matching(select, RULES) if select else set(RULES)
     selected -= codes_matching(ignore, RULES)
-    context = Context(parse(data, source), tolerances or Tolerances(), in_set=in_set)
+    context = Context(parse(data, source), tolerances or Tolerances(), in_set=in_set, labels=labels)
     return run(context, list(RULES.values()), selected, today=today)
 
 

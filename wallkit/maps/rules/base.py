@@ -19,6 +19,7 @@ from wallkit.maps.rules.tolerances import Tolerances
 
 if TYPE_CHECKING:
     from wallkit.maps.geometry import Part, Slice
+    from wallkit.maps.labels import Labels
     from wallkit.maps.model import SemanticMap
     from wallkit.maps.walls import WallEnd, WallRun
 
@@ -34,7 +35,7 @@ PREREQUISITES: Mapping[str, str] = {
     "E": "XSG",
     "O": "XSGE",
     "T": "XSGE",
-    "C": "XSGE",
+    "C": "XS",
     "L": "XSGEOTC",
     "P": "X",
 }
@@ -140,12 +141,14 @@ class Context:
 
     Attributes:
         in_set: the file is one level of several.
+        labels: of the segmentation model, by id; None when none are given.
         unused_ignores: for rules that run last: (<wk:ignore>, the code in it that matched nothing).
     """
 
     document: Document
     tolerances: Tolerances = field(default_factory=Tolerances)
     in_set: bool = False
+    labels: Labels | None = None
     unused_ignores: list[tuple[Element, str]] = field(default_factory=list)
     _made: dict[Callable[[Context], Any], Any] = field(default_factory=dict, repr=False)
 

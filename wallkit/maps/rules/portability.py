@@ -161,7 +161,9 @@ def p008_many(context: Context) -> Iterator[Problem]:
     """
     count = len(context.once(geometries))
     if count > context.tolerances.geometries:
-        message = f"the map has {count:,} shapes; yourdfpy and RViz become slow beyond {context.tolerances.geometries:,}"
+        message = (
+            f"the map has {count:,} shapes; yourdfpy and RViz become slow beyond {context.tolerances.geometries:,}"
+        )
         yield Problem(context.root, message, "one file per level; one box per straight piece of wall")
 
 

@@ -56,6 +56,11 @@ def known_elements(context: Context) -> list[Element]:
     return [placed.element for placed in context.once(placed_elements) if placed.standing == "known"]
 
 
+def is_plain_urdf(context: Context) -> bool:
+    """Whether nothing in the file is wallkit's."""
+    return not any(element.namespace == WK_NAMESPACE for element in context.root.iter())
+
+
 def s001_root_not_robot(context: Context) -> Iterator[Problem]:
     """The root element is not <robot>.
 
@@ -106,7 +111,7 @@ def s004_no_header(context: Context) -> Iterator[Problem]:
     """
     if context.root.tag != "robot" or context.root.find(wk("map")) is not None:
         return
-    is_plain = not any(element.namespace == WK_NAMESPACE for element in context.root.iter())
+    is_plain = context.once(is_plain_urdf)
     message = "plain URDF without <wk:map>: classes are guessed" if is_plain else "there is no <wk:map> header"
     hint = "`wallkit map adopt` writes it" if is_plain else 'add <wk:map format="1.0" units="m rad" up="z"/>'
     behind_root = context.root.start_span.end
