@@ -1,10 +1,14 @@
-"""Commands and settings -> docs/reference/cli.md and config.md; `--check` writes nothing and exits 1 if one is stale."""
+"""Commands, settings and map rules -> cli.md, config.md and map-rules.md in docs/reference.
+
+With `--check` nothing is written, and the exit code is 1 if a page is stale.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import inspect
 import json
+import re
 import sys
 import typing
 from collections.abc import Iterator
@@ -15,6 +19,9 @@ import click
 
 from wallkit.cli.app import main as wallkit
 from wallkit.core.config import name_in
+from wallkit.maps.rules import RULES
+from wallkit.maps.rules.base import PREREQUISITES, Rule
+from wallkit.maps.rules.docs import doc_of, is_file
 from wallkit.pipelines.config import Config
 
 REFERENCE = Path(__file__).parent / "reference"
@@ -85,6 +92,63 @@ def _settings(cls: type[Any], key: tuple[str, ...], level: int) -> Iterator[str]
             yield from _settings(entry, here, level + 2)
 
 
+GROUPS = {
+    "X": "Bytes and XML",
+    "S": "Schema and numbers",
+    "G": "Graph of links and joints",
+    "E": "Geometry of elements",
+    "O": "Openings and doors",
+    "T": "Rooms and topology",
+    "C": "Classes and labels",
+    "L": "Localization",
+    "P": "Portability",
+    "R": "Rasters",
+    "A": "Audit against a log",
+}
+
+
+def rules_page() -> str:
+    """Every rule about maps: severity, repair, why, and an example that raises it and one that does not."""
+    intro = (
+        "What `wallkit map validate` checks. An error makes the exit code 1, a warning only with `--strict`. A repair is"
+        " made by `wallkit map fix`: safe ones keep the meaning, moderate ones (`--fix moderate`) are most likely meant,"
+        " risky ones are only shown. A group runs when the groups it waits for have no blocking error; what did not run is"
+        ' told, and never counts as passed.\n\nExamples stand inside `<robot>` beside `<link name="map"/>`, unless they are'
+        " whole files. Where the lines are drawn is under [rules](config.md#rules) in the settings. In a map,"
+        ' `<wk:ignore rule="WK-E023" reason="..."/>` takes out findings of the element it stands in.'
+    )
+    lines = ["# Map rules", "", NOTE, "", intro]
+    for group, waits_for in PREREQUISITES.items():
+        rules = sorted((rule for rule in RULES.values() if rule.group == group), key=lambda rule: rule.code)
+        if not rules:
+            continue
+        lines += ["", f"## {group}: {GROUPS[group]}", "", f"Waits for: {' '.join(waits_for) or 'nothing'}.", ""]
+        rows = [(f"[{r.code}](#{r.code.lower()})", r.severity, r.fix or "-", _cell(doc_of(r).title)) for r in rules]
+        lines += _table(("rule", "severity", "repair", "what is wrong"), rows)
+        for rule in rules:
+            lines += _rule(rule)
+    return "\n".join(lines) + "\n"
+
+
+def _rule(rule: Rule) -> Iterator[str]:
+    doc = doc_of(rule)
+    repair = f", repair: {rule.fix}" if rule.fix else ""
+    yield from ("", f"### {rule.code}", "", f"{_cell(doc.title)} *{rule.severity}{repair}*")
+    if doc.why:
+        yield from ("", _cell(doc.why))
+    for word, example in (("Bad", doc.bad), ("Good", doc.good)):
+        kind = "xml" if is_file(example) else "yaml" if rule.group == "R" else ""
+        if kind:
+            yield from ("", f"{word}:", "", f"```{kind}", *example.splitlines(), "```")
+        elif example:
+            yield from ("", f"{word}: {_cell(' '.join(example.split()))}")
+
+
+def _cell(text: str) -> str:
+    """Words with what looks like a tag or an expression as code, so that Markdown shows it."""
+    return re.sub(r"<[!/?]?[\w:.-]+[^<>]*>|<!DOCTYPE|\$\{\w+\}|\*\.[\w.]+", lambda match: f"`{match[0]}`", text)
+
+
 def _default(f: dataclasses.Field[Any]) -> str:
     value = f.default
     return f"`{json.dumps(list(value) if isinstance(value, tuple) else value)}`"
@@ -121,7 +185,7 @@ def _with_rule(headers: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[tu
     return [headers, tuple("---" for _ in headers), *rows]
 
 
-PAGES = {"cli.md": cli_page, "config.md": config_page}
+PAGES = {"cli.md": cli_page, "config.md": config_page, "map-rules.md": rules_page}
 
 
 def main(is_check: bool) -> int:

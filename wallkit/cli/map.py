@@ -38,6 +38,9 @@ def map_group() -> None:
 @FILES
 @selection_options
 @click.option("--strict", is_flag=True, help="Warnings count as errors.")
+@click.option(
+    "--labels", type=click.Path(path_type=Path), metavar="FILE", help="A model's classes: text, YAML, JSON, ONNX."
+)
 @click.option("--baseline", type=click.Path(path_type=Path), metavar="FILE", help="Accept the findings listed in it.")
 @click.option("--write-baseline", is_flag=True, help="List the findings of now in the baseline, and accept them.")
 @click.option(
@@ -60,6 +63,7 @@ def validate(
     config_path: Path | None,
     words: tuple[str, ...],
     strict: bool,
+    labels: Path | None,
     baseline: Path | None,
     write_baseline: bool,
     format_name: str,
@@ -68,7 +72,8 @@ def validate(
 ) -> None:
     """Say everything that is wrong in maps: which rule, line and column, where in the map, and what to do.
 
-    Without FILE: the map named in wallkit.toml, else every *.wkmap.urdf here.
+    Without FILE: the map named in wallkit.toml, else every *.wkmap.urdf here. FILE may also be a map_server YAML, which is
+    judged with its image (rules R).
 
     Exits 0 if no error is found (with --strict: no warning either), 1 if one is, 2 if a file cannot be read. Rules that
     an error keeps from running are named; they never count as passed.
@@ -80,13 +85,20 @@ def validate(
       wallkit map validate floor2.wkmap.urdf --select schema,O --set rules.scan_plane_m=0.3
       wallkit map validate old.wkmap.urdf --baseline accepted.json --write-baseline
       wallkit map validate floor2.wkmap.urdf --format sarif > map.sarif
+      wallkit map validate floor2.wkmap.urdf --labels wallseg.onnx
+      wallkit map validate floor.yaml --strict
     """
+    from dataclasses import replace
+
     from wallkit.maps.formats_text import counted
+    from wallkit.maps.labels import read_labels
     from wallkit.pipelines import map as pipeline
 
     if write_baseline and baseline is None:
         raise click.UsageError("say where to: --baseline FILE --write-baseline")
     selection, configured = _selection(select, ignore, config_path, words)
+    if labels is not None:
+        selection = replace(selection, labels=read_labels(labels))
     judged = pipeline.judge(pipeline.map_files(files, configured), selection, is_strict=strict)
     if baseline is not None and write_baseline:
         count = pipeline.write_baseline(baseline, judged)

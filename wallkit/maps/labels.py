@@ -18,6 +18,7 @@ from wallkit.errors import MapError
 
 Labels = Mapping[int, str]
 _LARGEST_TEXT = 1_000_000
+_LONGEST_NAME = 100
 
 
 def read_labels(path: Path) -> Labels:
@@ -108,8 +109,10 @@ def _from_names(found: Any, path: Path) -> Labels:
     labels: dict[int, str] = {}
     for key, name in rows:
         number = _id_from(key)
-        if number is None or not isinstance(name, str) or not name.strip():
-            raise MapError(f"class {key!r} is {name!r}; it needs an id from 0 and a name", where=path, hint=_HINT)
+        if number is None or not isinstance(name, str) or not name.strip() or "<" in name or len(name) > _LONGEST_NAME:
+            raise MapError(
+                f"class {key!r} is {str(name)[:40]!r}; it needs an id from 0 and a name", where=path, hint=_HINT
+            )
         labels[number] = name.strip()
     if not labels:
         raise MapError("there are no classes in it", where=path, hint=_HINT)

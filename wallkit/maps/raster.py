@@ -19,6 +19,7 @@ from wallkit.errors import Finding, MapError, closest
 UNKNOWN_GREY = 205
 KEYS = ("image", "resolution", "origin", "mode", "negate", "occupied_thresh", "free_thresh")
 MODES = ("trinary", "scale", "raw")
+OCCUPIED_THRESH, FREE_THRESH = 0.65, 0.196
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +79,7 @@ def read_spec(path: Path) -> tuple[RasterSpec, dict[str, int]]:
             "origin", f"origin is {origin!r}", "three numbers: [x, y, yaw] of the lower left corner, metres and radians"
         )
     thresholds = {}
-    for key, default in (("occupied_thresh", 0.65), ("free_thresh", 0.196)):
+    for key, default in (("occupied_thresh", OCCUPIED_THRESH), ("free_thresh", FREE_THRESH)):
         value = _number(table.get(key, default))
         if value is None or not 0 <= value <= 1:
             raise fail(key, f"{key} is {table.get(key)!r}", "a number between 0 and 1")
@@ -87,7 +88,7 @@ def read_spec(path: Path) -> tuple[RasterSpec, dict[str, int]]:
         raise fail(
             "occupied_thresh",
             f"occupied_thresh {thresholds['occupied_thresh']} is not above free_thresh {thresholds['free_thresh']}",
-            "the usual pair is 0.65 and 0.196",
+            f"the usual pair is {OCCUPIED_THRESH} and {FREE_THRESH}",
         )
     image = Path(str(table["image"]))
     image = image if image.is_absolute() else path.parent / image
@@ -139,7 +140,7 @@ def _oddities(path: Path, lines: dict[str, int], spec: RasterSpec, pixels: np.nd
                 str(path),
                 f"free_thresh {spec.free_thresh} turns {count:,} unknown cells (grey {UNKNOWN_GREY}) into free space",
                 line=lines.get("free_thresh"),
-                hint="free_thresh: 0.196",
+                hint=f"free_thresh: {FREE_THRESH}",
                 detail={"cells": count},
             )
     if abs(spec.origin[2]) > 1e-9:

@@ -13,11 +13,11 @@ from pathlib import Path
 
 from wallkit.errors import MapError
 from wallkit.maps.judged import Judged
+from wallkit.maps.labels import Labels
 from wallkit.maps.repair import repair
 from wallkit.maps.rules import PROFILES, validate
 from wallkit.maps.rules.base import FixClass, MapFinding
 from wallkit.maps.rules.tolerances import Tolerances
-from wallkit.maps.xml import parse
 from wallkit.pipelines.outputs import write_whole as write_whole
 
 SUFFIX = ".wkmap.urdf"
@@ -29,12 +29,14 @@ class Selection:
 
     Attributes:
         select, ignore: codes, prefixes of codes, or for `select` names of profiles.
+        labels: of the segmentation model, by id; None when none are given.
     """
 
     tolerances: Tolerances
     today: datetime.date
     select: Sequence[str] = ()
     ignore: Sequence[str] = ()
+    labels: Labels | None = None
 
     @property
     def codes(self) -> list[str]:
@@ -43,14 +45,14 @@ class Selection:
 
 
 def map_files(named: Sequence[Path], configured: str, folder: Path = Path()) -> list[Path]:
-    """The maps meant: those named, else the one of the settings if it is a URDF, else every *.wkmap.urdf of the folder.
+    """The maps meant: those named, else the one of the settings, else every *.wkmap.urdf of the folder.
 
     Raises:
         MapError: there is none.
     """
     if named:
         return list(named)
-    if configured.endswith(".urdf"):
+    if configured:
         return [Path(configured)]
     found = sorted(folder.glob(f"*{SUFFIX}"))
     if not found:
@@ -191,8 +193,7 @@ def _judged(path: Path, data: bytes, selection: Selection, *, is_strict: bool = 
         select=selection.codes,
         ignore=selection.ignore,
         source=str(path),
+        labels=selection.labels,
         today=selection.today,
     )
-    # what could not be parsed to the end ends soon a second time
-    document = report.map.document if report.map is not None else parse(data, str(path))
-    return Judged(document, report, is_strict=is_strict)
+    return Judged(report.document, report, is_strict=is_strict)

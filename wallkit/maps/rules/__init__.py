@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from wallkit.errors import ConfigError, MapError, closest
+from wallkit.maps.document import Document
 from wallkit.maps.labels import Labels
 from wallkit.maps.rules import (
     cells,
@@ -21,6 +22,7 @@ from wallkit.maps.rules import (
     openings,
     placement,
     portability,
+    rasters,
     references,
     rooms,
     scale,
@@ -48,10 +50,12 @@ _GROUPS = (
     *(rooms.RULES, topology.RULES),
     *(taxonomy.RULES, vocabulary.RULES),
     *(slices.RULES, cells.RULES),
-    *(portability.RULES, references.RULES),
+    *(portability.RULES, references.RULES, rasters.RULES),
 )
 
 RULES: dict[str, Rule] = {rule.code: rule for group in _GROUPS for rule in sorted(group, key=lambda rule: rule.code)}
+
+RASTER_SUFFIXES = (".yaml", ".yml")
 
 # groups that a purpose needs, as words for `select`
 PROFILES: Mapping[str, tuple[str, ...]] = {
@@ -62,6 +66,7 @@ PROFILES: Mapping[str, tuple[str, ...]] = {
         "localization": "XSGEOTCLP",
         "simulation": "XSGEOCP",
         "compat": "XSP",
+        "raster": "R",
     }.items()
 }
 
@@ -77,12 +82,12 @@ def validate(
     labels: Labels | None = None,
     today: datetime.date | None = None,
 ) -> Report:
-    """Everything the rules have to say about a map file or its bytes.
+    """Everything the rules have to say about a map file or its bytes: group R of a map_server YAML, else all others.
 
     Args:
         select, ignore: codes or prefixes ("WK-E010", "E"); none selected means all. What is selected runs only where the
             groups it builds on hold.
-        source: name for messages, for bytes; meshes are looked for beside it.
+        source: name for messages, for bytes; meshes and images are looked for beside it.
         in_set: the file is one level of several.
         labels: of the segmentation model, by id.
         today: inline ignores that ended before it no longer count.
@@ -102,8 +107,11 @@ def validate(
         data = file
     selected = codes_matching(select, RULES) if select else set(RULES)
     selected -= codes_matching(ignore, RULES)
-    context = Context(parse(data, source), tolerances or Tolerances(), in_set=in_set, labels=labels)
-    return run(context, list(RULES.values()), selected, today=today)
+    is_raster = Path(source).suffix.lower() in RASTER_SUFFIXES
+    document = Document(source, data) if is_raster else parse(data, source)
+    context = Context(document, tolerances or Tolerances(), in_set=in_set, labels=labels)
+    fitting = [rule for rule in RULES.values() if (rule.group == "R") == is_raster]
+    return run(context, fitting, selected & {rule.code for rule in fitting}, today=today)
 
 
 def explain(code: str) -> str:

@@ -38,6 +38,8 @@ PREREQUISITES: Mapping[str, str] = {
     "C": "XS",
     "L": "XSGEOTC",
     "P": "X",
+    # of rasters, which are no XML: no other group runs on them, and this one on nothing else
+    "R": "",
 }
 
 

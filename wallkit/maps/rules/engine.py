@@ -34,15 +34,20 @@ class Report:
     Attributes:
         findings: sorted by line, column and code. ignored: those that an inline <wk:ignore> takes out.
         skipped: selected rules that could not run. checked: codes of the rules that ran.
-        map: the map as nouns; None when the file is not even XML.
+        document: the file. map: the map as nouns; None when the file is not even XML.
     """
 
-    source: str
+    document: Document
     findings: tuple[MapFinding, ...]
     ignored: tuple[MapFinding, ...]
     skipped: tuple[Skipped, ...]
     checked: tuple[str, ...]
     map: SemanticMap | None
+
+    @property
+    def source(self) -> str:
+        """The file's name, for messages."""
+        return self.document.source
 
     def count(self, severity: Severity) -> int:
         """How many findings are that severe."""
@@ -113,7 +118,7 @@ def run(
             found[rule.code] = _findings(rule, context)
             kept += found[rule.code]
     return Report(
-        source=context.document.source,
+        document=context.document,
         findings=tuple(sorted(kept, key=_order)),
         ignored=tuple(sorted(ignored, key=_order)),
         skipped=tuple(skip for skip in skipped if skip.code in selected),
