@@ -65,3 +65,41 @@ def test_diff_exits_with_its_verdict_and_says_it(run_here, tmp_path):
     assert (change["field"], change["before"], change["after"]) == ("scan_plane", "0.3", "0.4")
     assert run_here("diff", "a.urdf", "none.urdf").code == 2
     assert run_here("diff", "a.urdf", "torn.urdf").code == 2
+
+
+def test_merge_writes_both_changes(run_here, tmp_path):
+    done = run_here("merge", "a.urdf", "b.urdf", "c.urdf", "-o", "m.urdf")
+    assert done.code == 0
+    assert "taken from B: t: scan_plane 0.3 -> 0.4 m" in done.out
+    assert (tmp_path / "m.urdf").read_bytes() == MOVED.replace(b'scan_plane="0.30"', b'scan_plane="0.4"')
+    refused = run_here("merge", "a.urdf", "b.urdf", "c.urdf", "-o", "m.urdf")
+    assert (refused.code, refused.out) == (2, "")
+    assert run_here("merge", "a.urdf", "b.urdf", "c.urdf").code == 2
+
+
+def test_merge_lists_conflicts_and_writes_only_when_told_whose_to_take(run_here, tmp_path):
+    (tmp_path / "d.urdf").write_bytes(ROOM.replace(b'xyz="2 2 0"', b'xyz="1 1 0"'))
+    done = run_here("merge", "a.urdf", "b.urdf", "d.urdf", "-o", "m.urdf")
+    assert done.code == 1
+    assert "2 1.5 0" in done.out
+    assert "1 1 0" in done.out
+    assert not (tmp_path / "m.urdf").exists()
+    rows = json.loads(run_here("merge", "a.urdf", "b.urdf", "d.urdf", "--dry-run", "--json").out)
+    assert (len(rows["conflicts"]), rows["merged"]) == (1, False)
+    assert run_here("merge", "a.urdf", "b.urdf", "d.urdf", "-o", "m.urdf", "--theirs", "--dry-run").code == 0
+    assert not (tmp_path / "m.urdf").exists()
+    for flag, data in (("--ours", MOVED), ("--theirs", (tmp_path / "d.urdf").read_bytes())):
+        assert run_here("merge", "a.urdf", "b.urdf", "d.urdf", "-o", "m.urdf", "--overwrite", flag).code == 0
+        assert (tmp_path / "m.urdf").read_bytes() == data
+
+
+def test_merge_refuses_to_leave_something_hanging(run_here, tmp_path):
+    """A removes the desk, B puts a lamp on it."""
+    desk = (DESK + "\n" + placed("desk", "2 2 0")).encode()
+    lamp = box("lamp", "0.1 0.1 0.3", wk_class="furniture") + placed("lamp", "0 0 0.7", parent="desk")
+    (tmp_path / "gone.urdf").write_bytes(ROOM.replace(desk, b""))
+    (tmp_path / "lamp.urdf").write_bytes(ROOM.replace(b"</robot>", lamp.encode() + b"</robot>"))
+    done = run_here("merge", "a.urdf", "gone.urdf", "lamp.urdf", "-o", "m.urdf", "--ours")
+    assert done.code == 1
+    assert "broken by the merge: WK-G004" in done.out
+    assert not (tmp_path / "m.urdf").exists()

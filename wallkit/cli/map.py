@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from wallkit.cli import common
-from wallkit.cli.map_compare import diff, fmt
+from wallkit.cli.map_compare import diff, fmt, merge
 from wallkit.cli.map_draw import show
 from wallkit.cli.map_export import export
 from wallkit.cli.map_look import import_, info, ls
@@ -261,5 +261,5 @@ def _say_fixed(file: RepairedFile, *, dry_run: bool) -> None:
     click.echo(f"{file.path}: {len(file.fixed)} {would}, {left}{more}", err=dry_run)
 
 
-for command in (info, ls, show, fmt, diff, import_, export):
+for command in (info, ls, show, fmt, diff, merge, import_, export):
     map_group.add_command(command)

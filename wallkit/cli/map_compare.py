@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from wallkit.cli import common
+
+if TYPE_CHECKING:
+    from wallkit.pipelines.map_compare import MergedFile
 
 PATH = click.Path(path_type=Path)
 
@@ -81,3 +85,82 @@ def diff(ctx: click.Context, /, a: Path, b: Path, tolerance: float, as_json: boo
     else:
         click.echo(f"{a} and {b} mean the same")
     ctx.exit(common.FAILED_CHECK if changes else common.OK)
+
+
+@click.command()
+@click.argument("base", type=PATH, metavar="BASE")
+@click.argument("ours", type=PATH, metavar="A")
+@click.argument("theirs", type=PATH, metavar="B")
+@common.out_option
+@click.option("--ours", "favour", flag_value="ours", help="Where both changed something, take A's.")
+@click.option("--theirs", "favour", flag_value="theirs", help="Where both changed something, take B's.")
+@common.overwrite_option
+@common.dry_run_option
+@common.json_option
+@click.pass_context
+def merge(
+    ctx: click.Context,
+    /,
+    base: Path,
+    ours: Path,
+    theirs: Path,
+    out: Path | None,
+    favour: str | None,
+    overwrite: bool,
+    dry_run: bool,
+    as_json: bool,
+) -> None:
+    """Make one map of A and B, which were both made of BASE: A's file with what B changed.
+
+    Everything of A stays as it is written: comments, order, indentation. Names tell what is the same thing, and what one
+    side renamed is followed. What both changed differently is a conflict: it is listed with both values and nothing is
+    written, unless --ours or --theirs says whose to take.
+
+    Exits 0 if merged, 1 if there are conflicts or the result would be broken, 2 if a file cannot be read.
+
+    \b
+    Examples:
+      wallkit map merge base.wkmap.urdf mine.wkmap.urdf hers.wkmap.urdf -o floor2.wkmap.urdf
+      wallkit map merge base.wkmap.urdf mine.wkmap.urdf hers.wkmap.urdf --dry-run
+      wallkit map merge base.wkmap.urdf mine.wkmap.urdf hers.wkmap.urdf -o mine.wkmap.urdf --overwrite --theirs
+    """
+    from dataclasses import asdict
+
+    from wallkit.pipelines import map as files
+    from wallkit.pipelines.map_compare import check_target, merge_files
+
+    if out is None and not dry_run:
+        raise click.UsageError("say where to: -o merged.wkmap.urdf, or --dry-run")
+    if out is not None:
+        check_target(out, overwrite=overwrite)
+    done = merge_files(base, ours, theirs, favour="theirs" if favour == "theirs" else "ours")
+    is_good = not done.broken and (favour is not None or not done.conflicts)
+    if is_good and out is not None and not dry_run:
+        files.write_whole(out, done.data)
+    if as_json:
+        common.emit({**{key: value for key, value in asdict(done).items() if key != "data"}, "merged": is_good})
+    else:
+        click.echo("\n".join(_merge_lines(done, favour)))
+        if is_good and out is not None:
+            click.echo(f"{'would write' if dry_run else 'wrote'} {out}")
+        elif not is_good:
+            click.echo(
+                "nothing is written" + ("" if done.broken else ": pass --ours or --theirs, or settle them by hand")
+            )
+    ctx.exit(common.OK if is_good else common.FAILED_CHECK)
+
+
+# ------------------------------------------------------------------------------------------------ details
+
+
+def _merge_lines(done: MergedFile, favour: str | None) -> list[str]:
+    lines = []
+    for conflict in done.conflicts:
+        lines.append(
+            f"conflict: {conflict.place}" + (f" (taken from {'A' if favour == 'ours' else 'B'})" if favour else "")
+        )
+        values = (("base", conflict.base), ("A", conflict.ours), ("B", conflict.theirs))
+        lines += [f"  {side:<5} {value or '(none)'}" for side, value in values]
+    lines += [f"taken from B: {change.text}" for change in done.taken]
+    lines += [f"broken by the merge: {message}" for message in done.broken]
+    return lines or ["B changed nothing that A has not"]
