@@ -44,6 +44,8 @@ _ORDER = (
     "wall",
 )
 _ARC_STEPS = 25
+# what ends so much lower than its wall is no rounding
+_STEP_M = 0.01
 _GREY = "#9aa5b1"
 
 
@@ -165,19 +167,22 @@ def _links(
 def _solid_marks(own: Sequence[Part], class_name: str, settings: PlanSettings) -> list[Mark]:
     """What of a link is cut, and what is above or below, each as the outline of all its parts together."""
     by_style: dict[str, list[Geometry]] = {}
+    top_m = max(part.z_m[1] for part in own)
     for part in own:
         if settings.z_m is not None:
             is_cut, look = part.is_cut_by(settings.z_m), "light"
             shape = part.cut(settings.z_m) if is_cut else part.footprint
         elif class_name in CUT_CLASSES and len(own) > 1:
-            # the heads and sills of openings; a low wall of one box is drawn as it is
-            is_cut, look = part.is_cut_by(CUT_M), "over" if part.z_m[0] > CUT_M else "under"
+            # the heads and sills of openings, wherever the sill ends; a low wall of one box is drawn as it is
+            is_sill = part.z_m[1] < top_m - _STEP_M
+            is_cut = part.is_cut_by(CUT_M) and not is_sill
+            look = "over" if part.z_m[0] > CUT_M else "under"
             shape = part.cut(CUT_M) if is_cut else part.footprint
         else:
             is_cut, look, shape = True, "", part.footprint
         by_style.setdefault(class_style(class_name) if is_cut else look, []).append(shape)
     marks = []
-    for style in sorted(by_style, key=lambda name: name.startswith("c-")):
+    for style in sorted(by_style, key=lambda name: (name.startswith("c-"), name)):
         marks += areas_of(by_style[style], style)
     return marks
 

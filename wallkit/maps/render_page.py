@@ -165,7 +165,8 @@ def _window_heights(semantic_map: SemanticMap, solids: Sequence[Part], drawing: 
             along = T[:2, 0]
             out = np.array([-along[1], along[0]])
             out = out if (middle - centre) @ out >= 0 else -out
-            x, y = drawing.to_page((middle + out * (14 / drawing.scale))[None])[0].tolist()
+            deep_m = max((shape.size[1] for shape in link.shapes if shape.kind == "box"), default=0.0)
+            x, y = drawing.to_page((middle + out * (deep_m / 2 + 8 / drawing.scale))[None])[0].tolist()
             turn = math.degrees(math.atan2(along[1], along[0]))
             turn = (turn + 90) % 180 - 90
             words = f"{opening.z_m[0]:.2f} – {opening.z_m[1]:.2f}"
