@@ -114,7 +114,8 @@ def _room_names(semantic_map: SemanticMap, solids: Sequence[Part], drawing: Draw
     """Each name where most of the floor is free, with the room's area."""
     import shapely
 
-    footprints = np.array([part.footprint for part in solids], dtype=object)
+    swings = [shapely.MultiPoint(points).convex_hull for points in _swept_points(drawing)]
+    footprints = np.array([*(part.footprint for part in solids), *swings], dtype=object)
     tree = shapely.STRtree(footprints)
     groups = []
     for room in semantic_map.rooms.values():
@@ -136,6 +137,12 @@ def _room_names(semantic_map: SemanticMap, solids: Sequence[Part], drawing: Draw
         )
         groups.append(Group(f"name:{room.id}", "room-name", marks))
     return groups
+
+
+def _swept_points(drawing: Drawing) -> list[Float64Array]:
+    """Of every door, the leaf and its way: where no name should stand."""
+    doors = [group for group in drawing.plan if any(getattr(mark, "style", "") == "swing" for mark in group.marks)]
+    return [np.concatenate([mark_points(mark) for mark in group.marks]) for group in doors]
 
 
 def _link_names(solids: Sequence[Part], drawing: Drawing) -> list[Group]:

@@ -16,6 +16,7 @@ Lines = list[Float64Array]
 # (u0, v0, u1, v1) of the footprint in the fixture's frame
 Box = tuple[float, float, float, float]
 
+_WITHOUT = ("wall", "door", "window", "glass", "partition")
 _TURN: Float64Array = np.linspace(0.0, 2 * np.pi, 33)
 _HALF: Float64Array = np.linspace(-np.pi / 2, np.pi / 2, 17)
 
@@ -24,13 +25,13 @@ def symbol_of(class_name: str, link: str, box: Box) -> Lines:
     """Lines (N, 2) in the fixture's frame; none for a class that has no symbol.
 
     Args:
-        link: its name, which tells a chair from a table.
+        link: its name, which tells a chair from a table, in whatever class a map has for them.
     """
-    if class_name == "furniture":
-        word = next((word for word in FURNITURE if word in link.lower()), "")
-        return FURNITURE[word](box) if word else []
     draw = SYMBOLS.get(class_name)
-    return draw(box) if draw is not None else []
+    if draw is not None or class_name in _WITHOUT:
+        return draw(box) if draw is not None else []
+    word = next((word for word in FURNITURE if word in link.lower()), "")
+    return FURNITURE[word](box) if word else []
 
 
 # -------------------------------------------------------------------------------------------- details
