@@ -9,10 +9,14 @@ from typing import TYPE_CHECKING
 import click
 
 from wallkit.cli import common
+from wallkit.cli.map_add import add, new
 from wallkit.cli.map_compare import diff, fmt, merge
 from wallkit.cli.map_draw import show
+from wallkit.cli.map_edit import array, move, remove, rename, reparent, rotate, set_
 from wallkit.cli.map_export import export
+from wallkit.cli.map_frame import adopt, origin, scale
 from wallkit.cli.map_look import import_, info, ls
+from wallkit.cli.map_walls import cut, fill, join, snap, split
 
 if TYPE_CHECKING:
     from wallkit.maps.judged import Judged
@@ -31,7 +35,7 @@ selection_options = common.options(
 
 @click.group("map")
 def map_group() -> None:
-    """Judge, repair, look into, import and export semantic maps (URDF with walls, doors, rooms and fixtures)."""
+    """Draw, change, judge, repair, look into, import and export semantic maps (URDF with walls, doors, rooms)."""
 
 
 @map_group.command()
@@ -261,5 +265,10 @@ def _say_fixed(file: RepairedFile, *, dry_run: bool) -> None:
     click.echo(f"{file.path}: {len(file.fixed)} {would}, {left}{more}", err=dry_run)
 
 
-for command in (info, ls, show, fmt, diff, merge, import_, export):
+for command in (
+    *(new, add, array, move, rotate, rename, reparent, remove, set_),
+    *(cut, fill, split, join, snap),
+    *(adopt, scale, origin),
+    *(info, ls, show, fmt, diff, merge, import_, export),
+):
     map_group.add_command(command)

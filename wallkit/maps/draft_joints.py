@@ -46,7 +46,7 @@ def end_closures(axes: Float64Array, thicknesses_m: Float64Array) -> Float64Arra
     flat = closures.reshape(-1)
     stopped = np.zeros(len(ends), dtype=bool)
     for end, wall in _ends_inside_walls(ends, thicknesses_m):
-        flat[end] = _stop_at(
+        flat[end] = stop_at(
             ends[end] - ends[2 * wall], inward[end], thicknesses_m[walls[end]], inward[2 * wall], thicknesses_m[wall]
         )
         stopped[end] = True
@@ -79,12 +79,12 @@ def _close_meeting(inward: Float64Array, thicknesses_m: Float64Array, lengths_m:
         )
     for i in set(range(len(inward))) - set(through):
         closures[i] = max(
-            _stop_at(np.zeros(2), inward[i], thicknesses_m[i], inward[wall], thicknesses_m[wall]) for wall in through
+            stop_at(np.zeros(2), inward[i], thicknesses_m[i], inward[wall], thicknesses_m[wall]) for wall in through
         )
     return closures
 
 
-def _stop_at(
+def stop_at(
     offset: Float64Array, inward: Float64Array, thickness_m: float, along: Float64Array, through_m: float
 ) -> float:
     """How much a wall must grow so that both corners of its end touch the near face of the wall it runs into.

@@ -19,7 +19,7 @@ from wallkit.core.geometry import transform_points
 from wallkit.core.types import BoolArray, Float64Array, OccupancyGrid
 from wallkit.errors import MapError
 from wallkit.maps.draft import Draft, DraftFixture, DraftWall
-from wallkit.maps.draft_write import placed_walls
+from wallkit.maps.draft_placed import placed_walls
 from wallkit.maps.fields import FREE_TO, OCCUPIED_FROM, MapsSettings, distance_to, visible_surface
 from wallkit.maps.importers.imported import Imported, ImportOptions, Notes
 from wallkit.maps.importers.skeleton import middle_lines

@@ -55,7 +55,7 @@ def s017_word(context: Context) -> Iterator[Problem]:
             text = element.get(name)
             if text is None or element.tag == "joint":
                 continue
-            wrong = _wrong_word(value, text)
+            wrong = wrong_word(value, text)
             if wrong:
                 yield Problem(element.spot(name), f'{name}="{text}" of <{element.name}> is {wrong[0]}', wrong[1])
 
@@ -279,7 +279,7 @@ def _problem(bad: Malformed, message: str, hint: str) -> Problem:
     return Problem(attribute or bad.element, f"{bad.name} of <{bad.element.name}> {message}", hint, edits=edits)
 
 
-def _wrong_word(value: Value, text: str) -> tuple[str, str] | None:
+def wrong_word(value: Value, text: str) -> tuple[str, str] | None:
     """What is wrong with a word and what to write, or None."""
     if value.kind == "choice" and text not in value.choices:
         return "not a word it knows", closest(text, value.choices)
