@@ -17,6 +17,7 @@ from typing import Literal
 WK_NAMESPACE = "urn:wallkit:map:1"
 
 _ATTRIBUTE = re.compile(rb"""\s+([^\s=/>]+)\s*=\s*(?:"([^"]*)"|'([^']*)')""")
+_TRAILING_ZERO = re.compile(rb"[0-9]\.[0-9]*0[\s\"']")
 _LINE_END = re.compile(rb"\r\n|\n|\r")
 
 FaultKind = Literal[
@@ -220,6 +221,11 @@ class Document:
     def has_bom(self) -> bool:
         """Whether the file begins with the three bytes EF BB BF."""
         return self.data.startswith(codecs.BOM_UTF8)
+
+    @cached_property
+    def keeps_zeros(self) -> bool:
+        """Whether numbers are written with zeros at their end, as 0.50."""
+        return _TRAILING_ZERO.search(self.data) is not None
 
     def place(self, offset: int) -> tuple[int, int]:
         """Line and column (in characters) of a byte, both from 1."""

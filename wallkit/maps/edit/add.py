@@ -21,7 +21,7 @@ from wallkit.maps.edit.changes import Changes, appended, inserted_behind, insert
 from wallkit.maps.edit.lookup import Wall, check_new, class_named, numbered, refuse, room_named, wall_named
 from wallkit.maps.importers.fixtures import USUAL_SIZES, UsualSize
 from wallkit.maps.rules.base import Context
-from wallkit.maps.rules.floods import sealed_regions
+from wallkit.maps.rules.floods import sealed, sealed_regions
 from wallkit.maps.rules.rooms import room_polygons
 from wallkit.maps.walls import WallRun
 
@@ -265,9 +265,9 @@ def _flooded(context: Context, at: tuple[float, float]) -> Float64Array:
 
     regions = context.once(sealed_regions)
     region = next((region for region in regions if region.polygon.contains(Point(at))), None)
-    if region is None:
+    if region is None and any(polygon.contains(Point(at)) for polygon in context.once(sealed)):
         raise refuse(context, f"({at[0]:g}, {at[1]:g}) lies in something solid", "name a point on the free floor")
-    if region.is_outside:
+    if region is None or region.is_outside:
         raise refuse(context, f"({at[0]:g}, {at[1]:g}) is not enclosed by walls", "close the gaps (`wallkit map snap`)")
     ring = get_coordinates(region.polygon.exterior)[:-1]
     # the westernmost point is a corner, whichever the flood began with

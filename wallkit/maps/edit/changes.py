@@ -157,23 +157,22 @@ def renumbered(
     words = list(_WORD.finditer(text))
     new = [float(value) for value in values]
     if len(words) != len(new):
-        return (attribute.replaced_by(numbers_like((), new, decimals=decimals)),)
+        return (attribute.replaced_by(numbers_text_of(new, decimals=decimals)),)
     edits = []
     for match, value in zip(words, new, strict=True):
-        word = number_like(match[0], value, decimals=decimals)
+        word = number_like(match[0], value, decimals=decimals, keeps_zeros=document.keeps_zeros)
         if word != match[0]:
             edits.append(Edit(span.offset + match.start(), len(match[0]), word.encode()))
     return tuple(edits)
 
 
-def numbers_like(words: Sequence[str], values: Sequence[float], *, decimals: int = LENGTH_DECIMALS) -> str:
-    """Numbers with single blanks, each written like the word in its place."""
-    padded = [*words, *[""] * (len(values) - len(words))]
-    return " ".join(number_like(word, value, decimals=decimals) for word, value in zip(padded, values, strict=True))
+def numbers_text_of(values: Sequence[float], *, decimals: int = LENGTH_DECIMALS) -> str:
+    """New numbers with single blanks."""
+    return " ".join(number_like("", value, decimals=decimals) for value in values)
 
 
-def number_like(word: str, value: float, *, decimals: int = LENGTH_DECIMALS) -> str:
-    """A number with no fewer decimals than the word it replaces, and no more than `decimals`; zero is "0".
+def number_like(word: str, value: float, *, decimals: int = LENGTH_DECIMALS, keeps_zeros: bool = True) -> str:
+    """A number with no more than `decimals`, in a file that keeps zeros no fewer than the word it replaces; zero is "0".
 
     The word itself, where it is the number to half of the last decimal.
     """
@@ -181,7 +180,7 @@ def number_like(word: str, value: float, *, decimals: int = LENGTH_DECIMALS) -> 
     if old is not None and abs(old - value) < 0.5 * 10.0**-decimals:
         return word
     plain = _PLAIN.fullmatch(word)
-    kept = min(len(plain[1]), decimals) if plain else 0
+    kept = min(len(plain[1]), decimals) if plain and keeps_zeros else 0
     head, _, tail = f"{value:.{decimals}f}".partition(".")
     if not (head + tail).strip("-0"):
         return "0"
@@ -195,7 +194,7 @@ def set_origin(element: Element, xyz: Float64Array | None = None, rpy: Float64Ar
     given = [("xyz", xyz, LENGTH_DECIMALS), ("rpy", rpy, ANGLE_DECIMALS)]
     if origin is None:
         words = [
-            f'{name}="{numbers_like((), v.tolist(), decimals=d)}"' for name, v, d in given if v is not None and v.any()
+            f'{name}="{numbers_text_of(v.tolist(), decimals=d)}"' for name, v, d in given if v is not None and v.any()
         ]
         behind = [child for child in element.children if child.tag in ("parent", "child")]
         at = behind[-1].span.end if behind else element.start_span.end
@@ -208,7 +207,7 @@ def set_origin(element: Element, xyz: Float64Array | None = None, rpy: Float64Ar
         if attribute is not None:
             edits += renumbered(attribute, values, decimals=decimals)
         else:
-            edits += (with_attribute(origin, name, numbers_like((), values.tolist(), decimals=decimals)),)
+            edits += (with_attribute(origin, name, numbers_text_of(values.tolist(), decimals=decimals)),)
     return edits
 
 

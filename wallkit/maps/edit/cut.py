@@ -109,6 +109,7 @@ def check_fits(context: Context, wall: Wall, opening: DraftOpening) -> None:
         if min(x1, a1) - max(x0, a0) > SLIVER_M and min(z1, b1) - max(z0, b0) > SLIVER_M:
             message = f"the opening, {here}, overlaps opening '{other.id}', {_stretch((a0, b0, a1, b1))}"
             raise refuse(context, message, "choose another place")
+    _check_leaves_its_frame(context, wall, (x0, z0, x1, z1))
     taken = [o.id for link in context.map.links.values() for o in link.openings]
     if opening.id in taken:
         raise refuse(
@@ -185,6 +186,18 @@ def box_edits(part: Part, to: Rectangle) -> tuple[Edit, ...]:
 
 
 # ------------------------------------------------------------------------------------------------- details
+
+
+def _check_leaves_its_frame(context: Context, wall: Wall, hole: Rectangle) -> None:
+    """Refuse a hole that takes the end or the whole top of a wall away: that is a smaller wall, and no opening."""
+    import shapely
+
+    left = shapely.union_all([shapely.box(*r) for _, r in wall.boxes]).difference(shapely.box(*hole))
+    bounds = left.bounds if not left.is_empty else (0.0,) * 4
+    ends = (min(bounds[0], 0.0) - hole[0], min(bounds[1], 0.0) - hole[1], hole[2] - bounds[2], hole[3] - bounds[3])
+    if max(ends) > SLIVER_M:
+        message = f"the opening, {_stretch(hole)}, would take the end of wall '{wall.link.name}' away"
+        raise refuse(context, message, "leave a piece of wall beside or above it, or make the wall smaller")
 
 
 def _replaced(
