@@ -46,8 +46,9 @@ class PlaneView:
 
     Attributes:
         elements: everything with a shape but floors and ceilings, in the map's order.
-        closed, open: regions that the building encloses, with every door closed and with every leaf taken away.
-        open_counts: (height, how many of the latter) where that may change within the wobble, lowest first; else empty.
+        closed, open: free floor that is enclosed, with every door closed and with every leaf taken away.
+        open_counts: (height, regions that the building encloses, leaves taken away) where that may change within the
+            wobble, lowest first; else empty.
     """
 
     z_m: float
@@ -72,7 +73,8 @@ def view_at(semantic_map: SemanticMap, z_m: float, *, wobble_m: float = WOBBLE_M
     """What the plane at a height above the map's origin shows, every door at rest but for the regions."""
     solids = parts(semantic_map)
     leaves = {link for joint in semantic_map.doors for link in semantic_map.subtree(joint.child)}
-    fixed = [part for part in solids if part.link not in leaves and is_building(part, semantic_map.classes)]
+    fixed = [part for part in solids if part.link not in leaves and part.class_name not in FLAT_CLASSES]
+    building = [part for part in fixed if is_building(part, semantic_map.classes)]
     shut = [part for part in parts(semantic_map, semantic_map.door_states("closed")) if part.link in leaves]
     return PlaneView(
         z_m,
@@ -80,7 +82,7 @@ def view_at(semantic_map: SemanticMap, z_m: float, *, wobble_m: float = WOBBLE_M
         tuple(standings(solids, semantic_map.classes, z_m, wobble_m)),
         enclosed([*fixed, *shut], z_m),
         enclosed(fixed, z_m),
-        tuple(region_counts(fixed, z_m, wobble_m)),
+        tuple(region_counts(building, z_m, wobble_m)),
     )
 
 

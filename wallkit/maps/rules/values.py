@@ -73,14 +73,15 @@ def s020_one_shape(context: Context) -> Iterator[Problem]:
             continue
         geometries = element.findall("geometry")
         if len(geometries) != 1:
-            yield Problem(element, f"<{element.name}> has {len(geometries)} <geometry>, it needs one")
+            message = f"<{element.name}> has {len(geometries)} <geometry>, it needs one"
+            yield Problem(element, message, detail={"shapes": len(geometries)})
             continue
         shapes = [child for child in geometries[0].children if not child.namespace]
         if len(shapes) != 1:
             named = ": " + ", ".join(f"<{shape.name}>" for shape in shapes) if shapes else ""
             message = f"<geometry> has {len(shapes)} shapes{named}; readers take one"
             hint = "one <collision> for each shape" if shapes else f"put one of {', '.join(SHAPES)} into it"
-            yield Problem(geometries[0], message, hint)
+            yield Problem(geometries[0], message, hint, detail={"shapes": len(shapes)})
 
 
 def s021_number(context: Context) -> Iterator[Problem]:
