@@ -14,6 +14,7 @@ HEADS = {
     "pgm": "image: map.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n",
     "lines": "source_id: a\nfeatures:\n  - id: 0\n",
     "dxf": "  0\nSECTION\n  2\nHEADER\n",
+    "urdf": '<?xml version="1.0"?>\n<robot name="r">\n',
     "csv": "# boxes\nname,class,x,y,z,yaw,sx,sy,sz\n",
 }
 
@@ -37,7 +38,7 @@ def test_what_cannot_be_told_is_asked_for(tmp_path):
     path.write_bytes(b"\0\1\2")
     with pytest.raises(MapError) as caught:
         recognise(path)
-    assert caught.value.hint == "name it: --format rmf|pgm|lines|dxf|csv"
+    assert caught.value.hint == "name it: --format rmf|pgm|lines|dxf|csv|urdf"
 
 
 def test_an_unknown_format_is_answered_with_the_closest(tmp_path):

@@ -71,7 +71,7 @@ def ls(file: Path, class_name: str | None, room: str | None, as_json: bool) -> N
 @click.command("import")
 @FILE
 @common.out_option
-@click.option("--format", "format_name", metavar="rmf|pgm|lines|dxf|csv", help="Of FILE; else its content tells.")
+@click.option("--format", "format_name", metavar="rmf|pgm|lines|dxf|csv|urdf", help="Of FILE; else its content tells.")
 @click.option("--units", metavar="m|cm|mm|in|ft", help="Of FILE's lengths; else as it declares.")
 @click.option("--thickness", "thickness_m", type=float, metavar="M", help="Of walls drawn without one.")
 @click.option("--height", "height_m", type=float, metavar="M", help="Of walls without one; else 2.5.")
@@ -97,8 +97,8 @@ def import_(
 ) -> None:
     """Make maps of another program's file, one per level, and say everything that was read, guessed and left out.
 
-    Reads RMF building.yaml, map_server YAML + image, line lists, DXF and CSV of boxes. PATH is a .urdf file for a single
-    level, else a folder.
+    Reads RMF building.yaml, map_server YAML + image, line lists, DXF, CSV of boxes and plain URDF. PATH is a .urdf file
+    for a single level, else a folder.
 
     Exits 0 if done, 1 if the import itself found an error (a wrong unit), 2 if it could not be done.
 
@@ -129,7 +129,8 @@ def import_(
             click.echo(str(note))
         for level in levels:
             said = "would write" if dry_run else "wrote"
-            click.echo(f"{said} {level.path}: level {level.draft.level}, {len(level.draft.walls)} walls")
+            walls = f", {len(level.draft.walls)} walls" if level.draft.walls else ""
+            click.echo(f"{said} {level.path}: level {level.draft.level}{walls}")
     ctx.exit(common.FAILED_CHECK if any(note.severity == "error" for note in notes) else common.OK)
 
 

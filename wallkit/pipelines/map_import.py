@@ -37,7 +37,8 @@ def import_levels(
     if not imported.drafts:
         raise MapError("holds no level with walls", where=path, hint="say what it is: --format, --layer")
     levels = [
-        ImportedLevel(draft, _place(draft, out, imported.drafts), write_draft(draft)) for draft in imported.drafts
+        ImportedLevel(draft, _place(draft, out, imported.drafts), imported.data or write_draft(draft))
+        for draft in imported.drafts
     ]
     for level in levels:
         if level.path.exists() and not overwrite:

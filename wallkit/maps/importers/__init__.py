@@ -11,6 +11,7 @@ from wallkit.maps.importers.imported import Imported, Importer, ImportOptions
 from wallkit.maps.importers.lines import read_lines
 from wallkit.maps.importers.raster import read_map_raster
 from wallkit.maps.importers.rmf import read_rmf
+from wallkit.maps.importers.urdf import read_urdf
 
 __all__ = ["IMPORTERS", "ImportOptions", "Imported", "import_map", "recognise"]
 
@@ -52,6 +53,8 @@ def recognise(path: Path) -> str:
         return "lines"
     if "levels" in keys or path.name.endswith(".building.yaml"):
         return "rmf"
+    if b"<robot" in head:
+        return "urdf"
     header = next((line for line in lines if line and not line.startswith("#")), "")
     if len({word.strip().lower() for word in header.split(",")} & set(COLUMNS)) > len(COLUMNS) // 2:
         return "csv"
@@ -60,7 +63,7 @@ def recognise(path: Path) -> str:
     raise MapError("nothing in it tells its format", where=path, hint=f"name it: --format {'|'.join(IMPORTERS)}")
 
 
-SUFFIXES: dict[str, str] = {".dxf": "dxf", ".csv": "csv"}
+SUFFIXES: dict[str, str] = {".dxf": "dxf", ".csv": "csv", ".urdf": "urdf"}
 
 IMPORTERS: dict[str, Importer] = {
     "rmf": read_rmf,
@@ -68,4 +71,5 @@ IMPORTERS: dict[str, Importer] = {
     "lines": read_lines,
     "dxf": read_dxf,
     "csv": read_boxes,
+    "urdf": read_urdf,
 }

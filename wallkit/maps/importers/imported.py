@@ -41,12 +41,15 @@ class ImportOptions:
 class Imported:
     """What was made of a file: a draft per level, and everything the user should know about the making.
 
+    `data` is the map itself where nothing needs to be drawn anew; the one draft then only names it.
+
     Notes carry a rule's code where a rule tells of the same thing, else one of: import.read (what was found and how much),
     import.guessed (what the file does not say, with what was taken), import.skipped (what was left out, and why).
     """
 
     drafts: tuple[Draft, ...]
     notes: tuple[Finding, ...]
+    data: bytes = b""
 
 
 Importer = Callable[[Path, ImportOptions], Imported]
