@@ -35,6 +35,7 @@ def read_urdf(path: Path, options: ImportOptions) -> Imported:
         scan_plane_m=options.scan_plane_m,
     )
     for line in changes.said:
+        line = line.replace("; say it: --class NAME=CLASS", "")  # the flag of `map adopt`
         notes.guessed(line, hint="`wallkit map set NAME class=CLASS` says another" if "by its name" in line else "")
     _say_meshes(semantic_map, notes)
     data = apply_edits(semantic_map.document.data, changes.edits)
