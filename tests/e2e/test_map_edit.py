@@ -137,6 +137,16 @@ def test_a_template_is_valid_without_a_warning(template, more, run_here, tmp_pat
     assert report.skipped == ()
 
 
+def test_a_dry_run_of_new_prints_a_patch_that_makes_the_file(run_here, tmp_path):
+    done = run_here("new", "a.wkmap.urdf", "--template", "restroom", "--dry-run")
+    assert not (tmp_path / "a.wkmap.urdf").exists()
+    (tmp_path / "the.patch").write_text(done.out)
+    subprocess.run(["git", "apply", "the.patch"], cwd=tmp_path, check=True)
+    made = (tmp_path / "a.wkmap.urdf").read_bytes()
+    assert run_here("new", "a.wkmap.urdf", "--template", "restroom", "--overwrite").code == 0
+    assert (tmp_path / "a.wkmap.urdf").read_bytes() == made
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

@@ -226,8 +226,9 @@ def test_numbers_are_short_and_names_are_unique_and_tell_their_link():
     walls = ring(corners)
     text = write_draft(Draft("t", (*walls, DraftWall("door_wall", (9, 0), (12, 0), 0.1, openings=(DOOR,))))).decode()
     tree = etree.fromstring(text.encode())
-    numbers = [n for e in tree.iter() for k in ("xyz", "rpy", "size", "along", "z") for n in e.get(k, "").split()]
-    assert all(re.fullmatch(r"-?\d+(\.\d{0,5}[1-9])?", n) and n != "-0" for n in numbers)
+    for keys, decimals in ((("xyz", "size", "along", "z"), 6), (("rpy",), 7)):
+        numbers = [n for e in tree.iter() for k in keys for n in e.get(k, "").split()]
+        assert all(re.fullmatch(rf"-?\d+(\.\d{{0,{decimals - 1}}}[1-9])?", n) and n != "-0" for n in numbers)
     parts = [(c.getparent().get("name"), c.get("name")) for c in tree.iter("collision")]
     assert len({name for _, name in parts}) == len(parts)
     assert all(name.startswith(f"{link}.") for link, name in parts)

@@ -283,6 +283,21 @@ def test_a_number_is_written_like_the_one_it_replaces(word, value, text):
     assert number_like(word, value, keeps_zeros=False) == short
 
 
+@pytest.mark.parametrize(
+    ("verb", "args"), [(move, ("sink_1", (1, 0, 0))), (rotate, ("sink_1", 1.0)), (reorigin, ((1.0, 0.0, 0.0),))]
+)
+def test_what_cannot_be_read_is_not_written_anew(verb, args):
+    data = FLOOR.replace(b'"3.2 0.05 0"', b'"3,2 0.05 0"').replace(b'"-0.1 5.15 0"', b'"-0.1 nan 0"')
+    with pytest.raises(MapError, match="cannot be read") as refused:
+        verb(context_of(data), *args)
+    assert refused.value.where.startswith("t.urdf:")
+
+
+def test_what_other_programs_draw_is_named():
+    data = FLOOR.replace(b'<collision name="wall_s.run">', b"<visual><geometry/></visual><collision name='wall_s.run'>")
+    assert "wall_s: its 1 <visual> stays as before" in cut(context_of(data), "wall_s", P1).said
+
+
 # ------------------------------------------------------------------------------------------------ move, rotate
 
 

@@ -12,6 +12,8 @@ from wallkit.maps.draft_doors import DraftDoor, Leaf, leaves_of
 from wallkit.maps.draft_placed import PlacedWall
 
 DECIMALS = 6
+# at the far end of a long wall an angle is a length
+ANGLE_DECIMALS = 7
 
 
 def wall_lines(placed: PlacedWall) -> Iterator[str]:
@@ -147,7 +149,7 @@ def fixed_line(name: str, parent: str, xyz: tuple[float, float, float], yaw_rad:
 
 
 def origin_tag(xyz: tuple[float, float, float], yaw_rad: float = 0.0) -> str:
-    yaw = number_text(yaw_rad)
+    yaw = number_text(yaw_rad, ANGLE_DECIMALS)
     return "<origin" + attributes(xyz=numbers_text(xyz), rpy=None if yaw == "0" else f"0 0 {yaw}") + "/>"
 
 
@@ -161,9 +163,9 @@ def numbers_text(values: tuple[float, ...]) -> str:
     return " ".join(map(number_text, values))
 
 
-def number_text(value: float) -> str:
-    """A number with at most six decimals."""
-    text = f"{value:.{DECIMALS}f}".rstrip("0").rstrip(".")
+def number_text(value: float, decimals: int = DECIMALS) -> str:
+    """A number with at most so many decimals."""
+    text = f"{value:.{decimals}f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
 
 

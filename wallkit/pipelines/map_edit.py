@@ -20,7 +20,7 @@ from wallkit.pipelines.map import SUFFIX, read_bytes, unified_diff
 from wallkit.pipelines.outputs import write_whole
 
 # the groups that an edit can upset at once; localizability is for `validate`
-_JUDGED = ("X", "S", "G", "E", "O", "T")
+_JUDGED = ("X", "S", "G", "E", "O", "T", "C", "P")
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,9 @@ class EditedFile:
     @property
     def patch(self) -> str:
         """The unified diff, with the file named from here, so that `git apply` finds it."""
-        return unified_diff(self.before, self.after, Path(os.path.relpath(self.path)).as_posix())
+        name = Path(os.path.relpath(self.path)).as_posix()
+        patch = unified_diff(self.before, self.after, name)
+        return patch if self.before else patch.replace(f"--- a/{name}", "--- /dev/null", 1)
 
     def write(self) -> None:
         """Replace the file in one step, where anything changed.

@@ -6,18 +6,18 @@ that stays the same keeps its digits.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from wallkit.core.types import Float64Array
+from wallkit.errors import MapError
 from wallkit.maps.document import WK_NAMESPACE, Attribute, Document, Edit, Element, apply_edits, escaped
+from wallkit.maps.draft_xml import ANGLE_DECIMALS
+from wallkit.maps.draft_xml import DECIMALS as LENGTH_DECIMALS
 from wallkit.maps.numbers import number_from_text
 from wallkit.maps.rules.base import Context
-
-LENGTH_DECIMALS = 6
-# of angles one more: at the far end of 50 m they are a length
-ANGLE_DECIMALS = 7
 
 _INDENT = "  "
 _WORD = re.compile(r"\S+")
@@ -153,6 +153,7 @@ def renumbered(
 ) -> tuple[Edit, ...]:
     """Edits of those numbers of an attribute that change; blanks between them, and the other numbers, stay."""
     document, span = attribute.element.document, attribute.value_span
+    _check_finite(attribute.element, values)
     text = document.data[span.offset : span.end].decode("latin-1")
     words = list(_WORD.finditer(text))
     new = [float(value) for value in values]
@@ -190,6 +191,7 @@ def number_like(word: str, value: float, *, decimals: int = LENGTH_DECIMALS, kee
 
 def set_origin(element: Element, xyz: Float64Array | None = None, rpy: Float64Array | None = None) -> tuple[Edit, ...]:
     """Edits that give the <origin> of a joint, collision or visual other numbers; None leaves them."""
+    _check_finite(element, *(values for values in (xyz, rpy) if values is not None))
     origin = element.find("origin")
     given = [("xyz", xyz, LENGTH_DECIMALS), ("rpy", rpy, ANGLE_DECIMALS)]
     if origin is None:
@@ -212,6 +214,20 @@ def set_origin(element: Element, xyz: Float64Array | None = None, rpy: Float64Ar
 
 
 # ------------------------------------------------------------------------------------------------- details
+
+
+def _check_finite(element: Element, *groups: Sequence[float] | Float64Array) -> None:
+    """Refuse to write what could not be read.
+
+    Raises:
+        MapError: a number is not one.
+    """
+    if all(math.isfinite(value) for values in groups for value in values):
+        return
+    line, column = element.document.place(element.offset)
+    source = element.document.source
+    message = f"numbers of <{element.name}>, or of what it hangs on, cannot be read"
+    raise MapError(message, where=f"{source}:{line}:{column}", hint=f"wallkit map validate {source} --select S")
 
 
 def _insert(document: Document, at: int, text: str) -> Edit:

@@ -134,7 +134,7 @@ def hole_cut(context: Context, wall: Wall, opening: str, hole: Rectangle) -> Cha
         ]
         pieces = [(kind, r) for kind, r in pieces if r[2] - r[0] >= SLIVER_M and r[3] - r[1] >= SLIVER_M]
         changes += _replaced(context, wall, part, pieces, opening, taken)
-    return changes
+    return changes + Changes(said=visuals_stay(wall))
 
 
 def hole_closed(context: Context, wall: Wall, opening: str, hole: Rectangle) -> Changes:
@@ -170,7 +170,13 @@ def hole_closed(context: Context, wall: Wall, opening: str, hole: Rectangle) -> 
     edits += tuple(removed(part.shape.element) for part, _ in around[1:])
     said = [f"{kept.name}: {_stretch(old)} -> {_stretch(whole)}"]
     said += [f"{part.name}: removed, {_stretch(r)}" for part, r in around[1:]]
-    return Changes(edits, tuple(said))
+    return Changes(edits, (*said, *visuals_stay(wall)))
+
+
+def visuals_stay(wall: Wall) -> tuple[str, ...]:
+    """A word on what only other programs draw: a map has one truth, its collisions."""
+    count = sum(child.tag == "visual" for child in wall.link.element.children)
+    return (f"{wall.link.name}: its {count} <visual> stay{'s' * (count == 1)} as before",) if count else ()
 
 
 def box_edits(part: Part, to: Rectangle) -> tuple[Edit, ...]:

@@ -82,10 +82,8 @@ def _corridor(name: str, sizes: TemplateSizes) -> Draft:
     need_m = sizes.door_m + 2 * ASIDE_M
     _check_fits(sizes.width_m, need_m, "a door", "corridor", "--size", "--door")
     _check_fits(sizes.length_m, 2 * (sizes.door_m + _BEYOND_DOOR_M), "two open doors", "corridor", "--size", "--door")
-    # the doors sit at opposite sides of the axis
-    west = _door(
-        "d1", "door_w", sizes.width_m - need_m + ASIDE_M, sizes, side="right", connects=("corridor", "outside")
-    )
+    # both on the same side of the axis: turned by 180 degrees the corridor looks otherwise
+    west = _door("d1", "door_w", ASIDE_M, sizes, side="right", connects=("corridor", "outside"))
     east = _door("d2", "door_e", ASIDE_M, sizes, connects=("outside", "corridor"))
     walls = _ring(0.0, 0.0, sizes.length_m, sizes.width_m, sizes, west=(west,), east=(east,))
     return _draft(name, sizes, walls, rooms=(_floor("corridor", "corridor", 0.0, 0.0, sizes.length_m, sizes.width_m),))

@@ -19,7 +19,7 @@ from wallkit.maps.edit.changes import (
     set_origin,
     sliced,
 )
-from wallkit.maps.edit.cut import box_edits
+from wallkit.maps.edit.cut import box_edits, visuals_stay
 from wallkit.maps.edit.lookup import Wall, check_new, free_name, joint_above, refuse, wall_named
 from wallkit.maps.edit.place import copied_joint
 from wallkit.maps.geometry import Part
@@ -93,7 +93,7 @@ def split(context: Context, name: str, at_m: float, new: str = "") -> Changes:
     ]
     said += [f"opening {opening.id}: {name} -> {new}" for opening in moved]
     said += [f"{child.child}: hangs on {name} -> {new}" for child in goes]
-    return Changes(edits, tuple(said))
+    return Changes(edits, (*said, *visuals_stay(wall)))
 
 
 def join(context: Context, first: str, second: str) -> Changes:
@@ -162,7 +162,7 @@ def join(context: Context, first: str, second: str) -> Changes:
     end_m = b.bounds[2] + float(shift_m[0])
     left = number_text(a.bounds[0])
     first_line = f"{first}: {left} to {number_text(a.bounds[2])} m -> {left} to {number_text(end_m)} m"
-    return Changes(edits, (first_line, f"{second}: removed", *said))
+    return Changes(edits, (first_line, f"{second}: removed", *said, *visuals_stay(a)))
 
 
 # ------------------------------------------------------------------------------------------------- details

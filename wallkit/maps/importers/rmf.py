@@ -250,7 +250,7 @@ class _Reader:
         if sheer:
             self.notes.guessed(
                 f"level {name}: {len(sheer)} walls are drawn transparent (alpha below 1), and read as opaque walls",
-                hint="if they are of glass, set their class: `wallkit map set NAME class=glass`",
+                hint="if they are of glass, set their class: `wallkit map set FILE NAME class=glass`",
             )
         if count := len(level.get("floors") or []):
             self.notes.skipped(f"level {name}: {count} floor polygons: ground textures, not rooms")

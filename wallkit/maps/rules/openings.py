@@ -45,7 +45,7 @@ def o001_not_cut(context: Context) -> Iterator[Problem]:
                     f"opening '{opening.id}' is not cut: box '{part.name}' of wall '{wall.link.name}' "
                     f"stands {width_m:.3g} x {height_m:.3g} m in it"
                 )
-                hint = f"wallkit map cut {wall.link.name} {opening.id}"
+                hint = f"wallkit map cut {context.document.source} {wall.link.name} {opening.id}"
                 related = ((f"box '{part.name}'", part.shape.element),)
                 yield Problem(opening.element, message, hint, xyz=_middle(context, wall, opening), related=related)
 

@@ -155,7 +155,12 @@ def e041_whole_map(context: Context) -> Iterator[Problem]:
     if wrong is not None:
         unit, evidence = wrong
         message = f"the map seems to be in {unit}: {', '.join(evidence)}"
-        yield Problem(context.root, message, f"wallkit map scale {UNITS[unit]:g}", detail={"factor": UNITS[unit]})
+        yield Problem(
+            context.root,
+            message,
+            f"wallkit map scale {context.document.source} {UNITS[unit]:g}",
+            detail={"factor": UNITS[unit]},
+        )
 
 
 def e042_survey_coordinates(context: Context) -> Iterator[Problem]:
@@ -234,7 +239,12 @@ def e044_away(context: Context) -> Iterator[Problem]:
     away_m = _distance_m(nearest)
     if max(_AWAY_M, extent_m) < away_m <= context.tolerances.far_m:
         message = f"the map, {extent_m:.0f} m wide, begins {away_m:.0f} m from its origin with '{nearest.name}'"
-        yield Problem(context.root, message, "wallkit map origin", xyz=tuple(nearest.T_map_shape[:3, 3]))
+        yield Problem(
+            context.root,
+            message,
+            f"wallkit map origin {context.document.source}",
+            xyz=tuple(nearest.T_map_shape[:3, 3]),
+        )
 
 
 # -------------------------------------------------------------------------------------------- details

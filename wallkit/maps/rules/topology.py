@@ -141,7 +141,12 @@ def t008_no_door(context: Context) -> Iterator[Problem]:
         if name not in entered and not has_company:
             middle = rooms[name].representative_point()
             message = f"room '{name}' has no door"
-            yield Problem(context.map.rooms[name].element, message, "wallkit map add door", xyz=(middle.x, middle.y))
+            yield Problem(
+                context.map.rooms[name].element,
+                message,
+                f"wallkit map add door {context.document.source} --in WALL --at M --width M",
+                xyz=(middle.x, middle.y),
+            )
 
 
 def t011_area(context: Context) -> Iterator[Problem]:
