@@ -46,6 +46,11 @@ def section(cls: type[T], doc: str) -> T:
     return field(default_factory=cls, metadata={"doc": doc})
 
 
+def tables(cls: type[Any], doc: str) -> Any:
+    """A field that is a list of tables, [[like this]], each a settings class of its own; empty by default."""
+    return field(default=(), metadata={"doc": doc, "tables": cls})
+
+
 def pick(registry: Registry, name: str, *, what: str) -> Any:
     """The registry's entry of that name, or a user's own as "package.module:Name".
 
@@ -150,7 +155,7 @@ def table_from(settings: Any) -> dict[str, Any]:
                 sub = {"name": name_in(f.metadata["registry"], value), **sub}
             table[f.name] = sub
         elif isinstance(value, tuple):
-            table[f.name] = list(value)
+            table[f.name] = [table_from(item) if is_dataclass(item) else item for item in value]
         elif isinstance(value, Path):
             table[f.name] = str(value)
         else:
@@ -225,6 +230,8 @@ def _build(
         given = [(s, t[name]) for s, t in sources if name in t]
         if "registry" in f.metadata:
             values[name] = _build_component(f, given, here, origins)
+        elif "tables" in f.metadata:
+            values[name] = _build_tables(f.metadata["tables"], given, here, origins)
         elif is_dataclass(hints[name]):
             for source, value in given:
                 if not isinstance(value, Mapping):
@@ -266,6 +273,20 @@ def _build_component(
         raise ConfigError(error.message, where=origin, hint=error.hint) from error
     origins[".".join((*here, "name"))] = origin
     return _build(cls, tables, here, origins)
+
+
+def _build_tables(
+    cls: type[Any], given: list[tuple[Source, Any]], here: tuple[str, ...], origins: dict[str, str]
+) -> tuple[Any, ...]:
+    """One instance per table of the last source that has any; a source replaces the list as a whole."""
+    origins[".".join(here)] = "default"
+    if not given:
+        return ()
+    source, rows = given[-1]
+    if not isinstance(rows, list) or not all(isinstance(row, Mapping) for row in rows):
+        raise ConfigError(f"'{'.'.join(here)}' is a list of tables, not {rows!r}", where=source.place(here))
+    origins[".".join(here)] = source.place(here)
+    return tuple(_build(cls, [(source, row)], here, {}) for row in rows)
 
 
 def _checked(value: Any, hint: Any, f: dataclasses.Field[Any], source: Source, here: tuple[str, ...]) -> Any:
