@@ -15,6 +15,7 @@ from wallkit.cli.evaluate import compare, evaluate, report
 from wallkit.cli.localize import localize
 from wallkit.cli.log import log
 from wallkit.cli.map import map_group
+from wallkit.cli.simulate import simulate
 
 
 @click.group(cls=WallkitGroup, context_settings=CONTEXT)
@@ -32,5 +33,9 @@ def main() -> None:
     """
 
 
-for command in (demo, log, map_group, calib, localize, evaluate, compare, report, bench, config, completion, doctor):
+COMMANDS = (
+    *(demo, log, map_group, calib, localize, evaluate, compare, report, simulate),
+    *(bench, config, completion, doctor),
+)
+for command in COMMANDS:
     main.add_command(command)

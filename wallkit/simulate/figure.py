@@ -21,6 +21,9 @@ _STRIDE = 0.76
 _HIP, _SHOULDER, _THIGH, _SHIN, _ARM = 0.53, 0.818, 0.245, 0.246, 0.17
 _SWING = 2 / math.pi * _STRIDE / (4 * (_THIGH + _SHIN))
 _LIMBS = ("thigh", "shin", "foot", "upper_arm", "forearm")
+_JOINTS = ("hip", "knee", "ankle", "heel", "toe", "shoulder", "elbow", "wrist")
+_HIP_AT, _KNEE_AT, _ANKLE_AT, _HEEL_AT, _TOE_AT, _SHOULDER_AT, _ELBOW_AT, _WRIST_AT = range(len(_JOINTS))
+_IS_ARM = (False,) * 5 + (True,) * 3
 PARTS = (*(f"{limb}_{side}" for side in "lr" for limb in _LIMBS), "hips", "torso", "head")
 
 
@@ -76,25 +79,38 @@ def postures(
     # whoever stands has the legs together; the stride of those who walk is the same at any pace
     vigour = np.minimum(speeds_m_s / 0.3, 1.0)
     phase = 2 * math.pi * walked_m / (_STRIDE * h)
-    starts, ends = [], []
-    for side, lead in ((1.0, 0.0), (-1.0, math.pi)):
-        # swept evenly, by as much as the body moves on meanwhile: the foot on the floor stays there
-        swing = vigour * _SWING * np.arcsin(0.98 * np.sin(phase + lead))
-        # the knee bends while its leg comes forward
-        bend = 0.75 * vigour * np.maximum(0.0, np.cos(phase + lead))
-        hip = _point(0, side * 0.09 * girth, _HIP * h)
-        knee = hip + _hanging(swing, _THIGH * h)
-        ankle = knee + _hanging(swing - bend, _SHIN * h)
-        heel = ankle + _point(-0.04 + 0 * h, 0, -0.02)
-        toe = ankle + _point(0.11 * h * np.cos(bend / 2), 0, -0.055 * h * np.sin(bend / 2) - 0.02)
-        shoulder = _point(0, side * 0.19 * girth, _SHOULDER * h)
-        elbow = shoulder + _hanging(-0.8 * swing, _ARM * h)
-        wrist = elbow + _hanging(-0.8 * swing + 0.35, _ARM * h)
-        starts += [hip, knee, heel, shoulder, elbow]
-        ends += [knee, ankle, toe, elbow, wrist]
-    starts += [_point(0, 0.1, _HIP * h), _point(0, 0, (_HIP + 0.06) * h), _point(0.02, 0, 0.90 * h)]
-    ends += [_point(0, -0.1, _HIP * h), _point(0.02, 0, _SHOULDER * h - 0.05), _point(0.03, 0, 0.96 * h)]
-    T_person_part = _between(np.stack(starts, axis=1), np.stack(ends, axis=1))
+    sides = np.array([1.0, -1.0])
+    # swept evenly, by as much as the body moves on meanwhile: the foot on the floor stays there
+    both = phase[:, None] + np.array([0.0, math.pi])
+    swing = vigour[:, None] * _SWING * np.arcsin(0.98 * np.sin(both))
+    # the knee bends while its leg comes forward
+    bend = 0.75 * vigour[:, None] * np.maximum(0.0, np.cos(both))
+    points = np.zeros((len(people), 2, len(_JOINTS), 3))
+    x, y, z = np.moveaxis(points, -1, 0)
+    tall = h[:, None]
+    y[:] = (girth[:, None] * sides)[..., None] * np.where(np.array(_IS_ARM), 0.19, 0.09)
+    z[..., _HIP_AT] = _HIP * tall
+    z[..., _SHOULDER_AT] = _SHOULDER * tall
+    for before, after, angle, share in (
+        (_HIP_AT, _KNEE_AT, swing, _THIGH),
+        (_KNEE_AT, _ANKLE_AT, swing - bend, _SHIN),
+        (_SHOULDER_AT, _ELBOW_AT, -0.8 * swing, _ARM),
+        (_ELBOW_AT, _WRIST_AT, -0.8 * swing + 0.35, _ARM),
+    ):
+        x[..., after] = x[..., before] + np.sin(angle) * share * tall
+        z[..., after] = z[..., before] - np.cos(angle) * share * tall
+    x[..., _HEEL_AT], z[..., _HEEL_AT] = x[..., _ANKLE_AT] - 0.04, z[..., _ANKLE_AT] - 0.02
+    x[..., _TOE_AT] = x[..., _ANKLE_AT] + 0.11 * tall * np.cos(bend / 2)
+    z[..., _TOE_AT] = z[..., _ANKLE_AT] - 0.055 * tall * np.sin(bend / 2) - 0.02
+    starts = points[:, :, (_HIP_AT, _KNEE_AT, _HEEL_AT, _SHOULDER_AT, _ELBOW_AT)].reshape(len(people), 10, 3)
+    ends = points[:, :, (_KNEE_AT, _ANKLE_AT, _TOE_AT, _ELBOW_AT, _WRIST_AT)].reshape(len(people), 10, 3)
+    trunk = np.zeros((2, len(people), 3, 3))
+    # hips from side to side, torso and head upwards
+    trunk[:, :, 0, 1] = [[0.1], [-0.1]]
+    trunk[:, :, 1:, 0] = [[[0.0, 0.02]], [[0.02, 0.03]]]
+    trunk[0, :, :, 2] = np.column_stack([_HIP * h, (_HIP + 0.06) * h, 0.90 * h])
+    trunk[1, :, :, 2] = np.column_stack([_HIP * h, _SHOULDER * h - 0.05, 0.96 * h])
+    T_person_part = _between(np.concatenate([starts, trunk[0]], axis=1), np.concatenate([ends, trunk[1]], axis=1))
     c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
     T_map_person = np.tile(np.eye(4), (len(people), 1, 1, 1))
     T_map_person[:, 0, 0, 0], T_map_person[:, 0, 0, 1] = c, -s
@@ -106,25 +122,20 @@ def postures(
 # -------------------------------------------------------------------------------------------- details
 
 
-def _point(x: object, y: object, z: object) -> Float64Array:
-    """(P, 3)"""
-    return np.stack(np.broadcast_arrays(*(np.asarray(v, dtype=np.float64) for v in (x, y, z))), axis=-1)
-
-
-def _hanging(angle_rad: Float64Array, length_m: Float64Array) -> Float64Array:
-    """(P, 3) from a joint to the end of a limb that hangs forward by an angle."""
-    return _point(np.sin(angle_rad) * length_m, 0.0, -np.cos(angle_rad) * length_m)
-
-
 def _between(a: Float64Array, b: Float64Array) -> Float64Array:
     """(..., 4, 4) of capsules, axis z, from joints (..., 3) to the next."""
-    a, b = np.broadcast_arrays(a, b)
-    z = (b - a) / np.linalg.norm(b - a, axis=-1, keepdims=True)
-    beside = np.where(np.abs(z[..., 1:2]) < 0.9, [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
-    x = np.cross(beside, z)
-    x /= np.linalg.norm(x, axis=-1, keepdims=True)
+    z = b - a
+    z /= np.sqrt(np.sum(z * z, axis=-1, keepdims=True))
+    # x = y0 cross z, or (of a capsule along y) the x axis itself, which is square to it
+    lies = np.abs(z[..., 1]) > 0.9
+    x = np.stack([z[..., 2], np.zeros_like(z[..., 0]), -z[..., 0]], axis=-1)
+    x[lies] = (1.0, 0.0, 0.0)
+    x /= np.sqrt(np.sum(x * x, axis=-1, keepdims=True))
     T = np.zeros((*a.shape[:-1], 4, 4))
-    T[..., :3, 0], T[..., :3, 1], T[..., :3, 2] = x, np.cross(z, x), z
+    T[..., :3, 0], T[..., :3, 2] = x, z
+    T[..., 0, 1] = z[..., 1] * x[..., 2] - z[..., 2] * x[..., 1]
+    T[..., 1, 1] = z[..., 2] * x[..., 0] - z[..., 0] * x[..., 2]
+    T[..., 2, 1] = z[..., 0] * x[..., 1] - z[..., 1] * x[..., 0]
     T[..., :3, 3] = (a + b) / 2
     T[..., 3, 3] = 1.0
     return T

@@ -33,13 +33,22 @@ class Floor:
         return np.clip(cells, 0, np.array(self.clearance_m.shape) - 1)
 
     def clearance_at(self, points: Float64Array) -> Float64Array:
-        """(...,) [m] distance of points (..., 2) to the nearest obstacle, to within a cell."""
+        """(...,) [m] distance of points (..., 2) to the nearest obstacle, to within a cell; 0 beyond the map."""
+        points = np.asarray(points, dtype=np.float64)
+        high = self.origin + np.array(self.clearance_m.shape[::-1]) * CELL_M
         row, column = np.moveaxis(self.cells_of(points), -1, 0)
-        return np.asarray(self.clearance_m[row, column])
+        is_on = ((points >= self.origin) & (points <= high)).all(axis=-1)
+        return np.where(is_on, self.clearance_m[row, column], 0.0)
 
     def free_points(self, radius_m: float) -> Float64Array:
-        """(P, 2) centres of the cells inside where something of that radius can be."""
-        row, column = np.nonzero((self.clearance_m > radius_m) & self.is_inside)
+        """(P, 2) centres of the cells inside where something of that radius can be: of those that it can go between, most."""
+        from scipy.ndimage import label
+
+        usable = (self.clearance_m > radius_m) & self.is_inside
+        regions, _ = label(usable)
+        sizes = np.bincount(regions.ravel())
+        sizes[0] = 0
+        row, column = np.nonzero(usable & (regions == int(np.argmax(sizes))))
         return self.origin + (np.column_stack([column, row]) + 0.5) * CELL_M
 
     def way(self, start: Sequence[float], end: Sequence[float], radius_m: float) -> Float64Array:

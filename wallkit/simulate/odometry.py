@@ -27,7 +27,9 @@ class WheelOdometry:
     alpha3: float = setting(0.01, "way noise per way [m2 per m2]", low=0)
     alpha4: float = setting(0.002, "way noise per turn [m2 per rad2]", low=0)
     radius_error: float = setting(0.005, "both wheels are larger than believed, relative", low=-0.5, high=0.5)
-    difference_error: float = setting(0.001, "the right wheel is larger than the left one, relative", low=-0.5, high=0.5)
+    difference_error: float = setting(
+        0.001, "the right wheel is larger than the left one, relative", low=-0.5, high=0.5
+    )
     baseline_m: float = setting(0.35, "distance of the wheels", low=0.05, high=3)
     baseline_error: float = setting(0.01, "the wheels are farther apart than believed, relative", low=-0.5, high=0.5)
     slips_per_minute: float = setting(0.0, "how often the wheels spin without moving the robot", low=0)
@@ -36,9 +38,7 @@ class WheelOdometry:
     tick_m: float = setting(0.0, "way of a wheel per encoder tick; 0: exact", low=0)
 
 
-def odometry_of(
-    rng: np.random.Generator, odometry: WheelOdometry, poses: Float64Array, rate_hz: float
-) -> Float64Array:
+def odometry_of(rng: np.random.Generator, odometry: WheelOdometry, poses: Float64Array, rate_hz: float) -> Float64Array:
     """T_odom_base (T, 3) claimed of true T_map_base (T, 3) at a rate; it begins at the origin."""
     steps = relative(poses[:-1], poses[1:])
     steps = _with_wheels(rng, odometry, _noisy(rng, odometry, steps), rate_hz)
@@ -111,7 +111,9 @@ def _with_wheels(
     left = left + slips * (odometry.slip_m - sides * odometry.slip_rad * base / 2)
     right = right + slips * (odometry.slip_m + sides * odometry.slip_rad * base / 2)
     if odometry.tick_m > 0:
-        left, right = (np.diff(np.floor(np.cumsum(w) / odometry.tick_m), prepend=0) * odometry.tick_m for w in (left, right))
+        left, right = (
+            np.diff(np.floor(np.cumsum(w) / odometry.tick_m), prepend=0) * odometry.tick_m for w in (left, right)
+        )
     believed = base / (1 + odometry.baseline_error)
     return np.column_stack([(left + right) / 2, steps[:, 1], (right - left) / believed])
 

@@ -77,7 +77,9 @@ def robot_from_urdf(path: Path = DEFAULT_ROBOT) -> Robot:
     if not path.is_file():
         raise SimulationError("there is no such robot", where=str(path), hint="name a URDF file with --robot")
     try:
-        urdf = yourdfpy.URDF.load(str(path), build_scene_graph=True, load_meshes=False, build_collision_scene_graph=False)
+        urdf = yourdfpy.URDF.load(
+            str(path), build_scene_graph=True, load_meshes=False, build_collision_scene_graph=False
+        )
         links = [link.name for link in urdf.robot.links]
         base = next((name for name in _BASES if name in links), urdf.base_link)
         frames = {name: np.asarray(urdf.get_transform(name, base), dtype=np.float64) for name in links}

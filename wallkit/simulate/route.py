@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,14 +18,20 @@ from wallkit.simulate.floor import CELL_M, Floor
 _STEP_S = 0.01
 _LOOKAHEAD_M = 0.35
 _TURN_IN_PLACE_RAD = 0.9
-_ARRIVED_M = 0.06
+_ARRIVED_M, _STOPPED_M_S = 0.06, 0.06
+_LONGEST_S = 7200.0
+# x, y, yaw, speed, turn rate; and a leg's two ends with its length
+_State = tuple[float, float, float, float, float]
+_Leg = tuple[float, float, float, float, float]
 
 
 @dataclass(frozen=True)
 class Route:
     """Where the robot goes and how; the way between two waypoints goes round what stands between them."""
 
-    waypoints: tuple[tuple[float, float], ...] = setting((), "x y of the places it passes, in order [m]; none: by chance")
+    waypoints: tuple[tuple[float, float], ...] = setting(
+        (), "x y of the places it passes, in order [m]; none: by chance"
+    )
     laps: int = setting(1, "times round; more than one: back to the first waypoint after the last", low=1, high=1000)
     direct: bool = setting(False, "straight from waypoint to waypoint, instead of round obstacles")
     speed_m_s: float = setting(0.5, "cruising speed", low=0.02, high=3)
@@ -35,33 +42,37 @@ class Route:
     random_stops: int = setting(8, "waypoints drawn by chance when none are given", low=2, high=1000)
 
 
-def drive(rng: np.random.Generator, route: Route, floor: Floor, rate_hz: float) -> Float64Array:
+def drive(
+    rng: np.random.Generator, route: Route, floor: Floor, rate_hz: float, *, duration_s: float = 0.0
+) -> Float64Array:
     """Poses (T, 3), T_map_base, of a robot along its route at a rate, standing for half a second at both ends.
+
+    Args:
+        duration_s: it ends then at the latest; 0: with the route.
 
     Raises:
         SimulationError: fewer than two waypoints, one within an obstacle, no way between two, or (direct) a wall on the way.
     """
     corners = _corners(rng, route, floor)
-    pose = np.array([*corners[0], math.atan2(*(corners[1] - corners[0])[::-1])])
-    speed = turn = 0.0
+    longest = round(min(duration_s or _LONGEST_S, _LONGEST_S) / _STEP_S)
     stand = round(0.5 / _STEP_S)
-    poses = [pose.copy()] * stand
+    (x0, y0), (x1, y1) = corners[:2].tolist()
+    state: _State = (x0, y0, math.atan2(y1 - y0, x1 - x0), 0.0, 0.0)
+    states = [state] * stand
     target, stop_at = 1, _stops(route, corners)
-    for _ in range(int(3600 / _STEP_S)):
-        if target == len(corners):
-            break
-        pose, speed, turn, is_there = _step(route, pose, (speed, turn), corners, target, is_stop=target in stop_at)
-        poses.append(pose.copy())
+    legs: list[_Leg] = [(*a, *b, math.dist(a, b)) for a, b in pairwise(corners.tolist())]
+    while target < len(corners) and len(states) <= longest:
+        state, is_there = _step(route, state, legs[target - 1], is_stop=target in stop_at)
+        states.append(state)
         if is_there:
             if target in stop_at:
-                poses += [pose.copy()] * round(route.pause_s / _STEP_S)
+                states += [state] * round(route.pause_s / _STEP_S)
             target += 1
-    poses += [pose.copy()] * stand
-    every = np.arange(0.0, len(poses) - 1, 1 / (rate_hz * _STEP_S))
-    found = np.array(poses)
-    found[:, 2] = np.unwrap(found[:, 2])
-    at = np.arange(len(found))
-    sampled = np.column_stack([np.interp(every, at, column) for column in found.T])
+    states += [state] * stand
+    poses = np.array(states)[: longest + 1, :3]
+    every = np.arange(0.0, len(poses) - 1 + 1e-9, 1 / (rate_hz * _STEP_S))
+    poses[:, 2] = np.unwrap(poses[:, 2])
+    sampled = np.column_stack([np.interp(every, np.arange(len(poses)), column) for column in poses.T])
     sampled[:, 2] = wrap_angle(sampled[:, 2])
     return sampled
 
@@ -116,38 +127,24 @@ def _stops(route: Route, corners: Float64Array) -> set[int]:
     return {last, *near} - {0}
 
 
-def _step(
-    route: Route,
-    pose: Float64Array,
-    now: tuple[float, float],
-    corners: Float64Array,
-    target: int,
-    *,
-    is_stop: bool,
-) -> tuple[Float64Array, float, float, bool]:
-    """Pose, speed and turn rate a hundredth of a second later, and whether the target is reached."""
-    speed, turn = now
-    to_target = corners[target] - pose[:2]
-    distance = float(np.hypot(*to_target))
-    aim = _ahead(pose[:2], corners, target)
-    off = float(wrap_angle(math.atan2(*(aim - pose[:2])[::-1]) - pose[2]))
-    wanted_turn = float(np.clip(2.5 * off, -route.turn_rad_s, route.turn_rad_s))
+def _step(route: Route, state: _State, leg: _Leg, *, is_stop: bool) -> tuple[_State, bool]:
+    """A hundredth of a second later, and whether the leg's end is reached. In plain floats: a log has many of these."""
+    x, y, yaw, speed, turn = state
+    x0, y0, x1, y1, length = leg
+    distance = math.hypot(x1 - x, y1 - y)
+    # the point a short way ahead on the leg
+    along = ((x - x0) * (x1 - x0) + (y - y0) * (y1 - y0)) / length
+    share = min((along + _LOOKAHEAD_M) / length, 1.0)
+    off = math.atan2(y0 + share * (y1 - y0) - y, x0 + share * (x1 - x0) - x) - yaw
+    off = (off + math.pi) % (2 * math.pi) - math.pi
+    wanted_turn = min(max(2.5 * off, -route.turn_rad_s), route.turn_rad_s)
     wanted = 0.0 if abs(off) > _TURN_IN_PLACE_RAD else route.speed_m_s * max(0.15, 1 - abs(off) / _TURN_IN_PLACE_RAD)
     if is_stop:
         wanted = min(wanted, math.sqrt(2 * route.acceleration_m_s2 * max(distance - _ARRIVED_M / 2, 0.0)) + 0.02)
     gain = route.acceleration_m_s2 * _STEP_S
-    speed += float(np.clip(wanted - speed, -2 * gain, gain))
-    turn += float(np.clip(wanted_turn - turn, -6 * _STEP_S, 6 * _STEP_S))
-    middle = pose[2] + turn * _STEP_S / 2
-    moved = pose + _STEP_S * np.array([speed * math.cos(middle), speed * math.sin(middle), turn])
-    reached = _ARRIVED_M if is_stop else _LOOKAHEAD_M / 2
-    return moved, speed, turn, distance < reached
-
-
-def _ahead(at: Float64Array, corners: Float64Array, target: int) -> Float64Array:
-    """The point a short way ahead on the leg to the target."""
-    start, end = corners[target - 1], corners[target]
-    leg = end - start
-    length = float(np.hypot(*leg))
-    along = float(np.dot(at - start, leg)) / length
-    return np.asarray(start + leg * min((along + _LOOKAHEAD_M) / length, 1.0))
+    speed += min(max(wanted - speed, -2 * gain), gain)
+    turn += min(max(wanted_turn - turn, -6 * _STEP_S), 6 * _STEP_S)
+    middle = yaw + turn * _STEP_S / 2
+    way = _STEP_S * speed
+    moved = (x + way * math.cos(middle), y + way * math.sin(middle), yaw + turn * _STEP_S, speed, turn)
+    return moved, distance < _ARRIVED_M and speed < _STOPPED_M_S if is_stop else distance < _LOOKAHEAD_M / 2

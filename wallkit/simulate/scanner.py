@@ -148,7 +148,7 @@ def _echoes(
     R, origin = T_map_lidar[:3, :3], T_map_lidar[:3, 3]
     directions = np.column_stack([np.cos(bearings), np.sin(bearings), np.zeros(len(bearings))]) @ R.T
     hits = scene.cast(origin, directions)
-    lights = np.array([solid.light for solid in scene.world.solids] + ["none"])[hits.solids]
+    lights = scene.lights[hits.solids]
     if (lights == "glass").any():
         hits, lights = _through_glass(rng, scene, origin, directions, hits, lights)
     cosines = np.abs(np.nan_to_num(np.sum(hits.normals * directions, axis=1)))
@@ -168,12 +168,12 @@ def _through_glass(
     lights: np.ndarray,
 ) -> tuple[Hits, np.ndarray]:
     """Beams that glass does not answer go on to what is behind it, once; glass behind glass is looked through."""
-    answers = np.array([solid.p_return for solid in scene.world.solids] + [1.0])[hits.solids]
+    answers = scene.p_return[hits.solids]
     passes = (lights == "glass") & (rng.random(len(lights)) >= answers)
     behind = scene.cast(origin, directions[passes], unseen=("glass",))
     ranges, solids, normals = hits.ranges_m.copy(), hits.solids.copy(), hits.normals.copy()
     ranges[passes], solids[passes], normals[passes] = behind.ranges_m, behind.solids, behind.normals
-    lights = np.array([solid.light for solid in scene.world.solids] + ["none"])[solids]
+    lights = scene.lights[solids]
     return Hits(ranges, solids, normals), lights
 
 

@@ -110,6 +110,16 @@ class Scene:
         return np.array([places[solid.class_name] for solid in self.world.solids], dtype=np.int64)
 
     @cached_property
+    def lights(self) -> np.ndarray:
+        """(S + 1,) how each solid behaves to light; the last one stands for NOTHING."""
+        return np.array([*(solid.light for solid in self.world.solids), "none"])
+
+    @cached_property
+    def p_return(self) -> Float64Array:
+        """(S + 1,) probability that each solid answers a beam; the last one stands for NOTHING."""
+        return np.array([*(solid.p_return for solid in self.world.solids), 1.0])
+
+    @cached_property
     def instance_names(self) -> tuple[str, ...]:
         """Every thing in the world, in order of appearance."""
         return tuple(dict.fromkeys(solid.instance for solid in self.world.solids))
