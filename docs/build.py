@@ -23,6 +23,7 @@ from wallkit.maps.rules import RULES
 from wallkit.maps.rules.base import PREREQUISITES, Rule
 from wallkit.maps.rules.docs import doc_of, is_file
 from wallkit.pipelines.config import Config
+from wallkit.simulate.scenario import Scenario
 
 REFERENCE = Path(__file__).parent / "reference"
 NOTE = "<!-- Written by `python docs/build.py`: change the docstring or the option in the code, not this page. -->"
@@ -65,11 +66,28 @@ def config_page() -> str:
     return "\n".join(lines) + "\n"
 
 
+def _table_header(f: dataclasses.Field[Any], key: tuple[str, ...]) -> str:
+    """[table] or [[one of several]]."""
+    name = f"[{'.'.join(key)}]"
+    return f"[{name}]" if "tables" in f.metadata else name
+
+
+def scenario_page() -> str:
+    """Everything that can be said of a simulated log."""
+    intro = (
+        "What happens in a log that `wallkit simulate log MAP --scenario FILE.toml` makes, and what its sensors do wrong."
+        " Every key can also be given as `--set KEY=VALUE`. What is a list of tables is written `[[doors]]` once for each."
+    )
+    return "\n".join(["# Scenarios", "", NOTE, "", intro, *_settings(Scenario, (), 2)]) + "\n"
+
+
 def _settings(cls: type[Any], key: tuple[str, ...], level: int) -> Iterator[str]:
     """The table of a settings class, then everything below it."""
     hints = typing.get_type_hints(cls)
     fields = dataclasses.fields(cls)
-    plain = [f for f in fields if "registry" not in f.metadata and not dataclasses.is_dataclass(hints[f.name])]
+    plain = [
+        f for f in fields if not {"registry", "tables"} & {*f.metadata} and not dataclasses.is_dataclass(hints[f.name])
+    ]
     rows = [(f"`{'.'.join((*key, f.name))}`", _default(f), _range(f, hints[f.name]), f.metadata["doc"]) for f in plain]
     yield from ("", *_table(("setting", "default", "range", "meaning"), rows)) if rows else ("", "No settings.")
     for f in (f for f in plain if "choice" in f.metadata):
@@ -80,9 +98,9 @@ def _settings(cls: type[Any], key: tuple[str, ...], level: int) -> Iterator[str]
         yield from _table(("name", "what it does"), choices)
     for f in (f for f in fields if f not in plain):
         here = (*key, f.name)
-        yield from ("", f"{'#' * level} `[{'.'.join(here)}]`", "", _sentence(f))
+        yield from ("", f"{'#' * level} `{_table_header(f, here)}`", "", _sentence(f))
         if "registry" not in f.metadata:
-            yield from _settings(hints[f.name], here, level + 1)
+            yield from _settings(f.metadata.get("tables", hints[f.name]), here, level + 1)
             continue
         registry = f.metadata["registry"]
         default = name_in(registry, f.default_factory())  # type: ignore[misc]
@@ -185,7 +203,7 @@ def _with_rule(headers: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[tu
     return [headers, tuple("---" for _ in headers), *rows]
 
 
-PAGES = {"cli.md": cli_page, "config.md": config_page, "map-rules.md": rules_page}
+PAGES = {"cli.md": cli_page, "config.md": config_page, "map-rules.md": rules_page, "scenario.md": scenario_page}
 
 
 def main(is_check: bool) -> int:

@@ -135,7 +135,8 @@ def test_the_readme_names_every_command():
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_every_setting_that_is_named_exists(page):
     """Settings of one alternative of a part (localize.sensor.beams) are in the reference, but not among the defaults."""
-    reference = (ROOT / "docs/reference/config.md").read_text(encoding="utf-8")
+    pages = ("config.md", "scenario.md")
+    reference = "".join((ROOT / "docs/reference" / name).read_text(encoding="utf-8") for name in pages)
     named = {key for found in SETTING.findall(page.read_text(encoding="utf-8")) for key in found if key}
     # the setting that the guide's own sensor model brings along
     named -= {"localize.sensor.scale_m"} if page.name == "add-a-sensor-model.md" else set()
@@ -224,7 +225,7 @@ def test_the_readmes_test_command_installs_what_the_tests_need():
     *_, install, test = readme_command("pytest -q")
     assert (install, test) == ("pip install '.[test]'", "pytest -q")
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert {"pytest", "ezdxf", "hypothesis", "ruff", "mypy"} == {
+    assert {"pytest", "ezdxf", "mujoco", "hypothesis", "ruff", "mypy"} == {
         re.split(r"[<>=]", name)[0] for name in project["optional-dependencies"]["test"]
     }
 

@@ -6,38 +6,31 @@ import heapq
 import json
 import zlib
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 import wallkit
 from wallkit.core.config import table_from
-from wallkit.core.geometry import interpolate_poses, matrix_from_pose
-from wallkit.core.types import Float64Array, Int64Array, Odometry, StampedPose, Trajectory, Transform
+from wallkit.core.types import Trajectory, Transform
 from wallkit.errors import SimulationError
 from wallkit.evaluate.tum import write_tum
-from wallkit.logs.encode import cloud_message
-from wallkit.logs.message import Value
 from wallkit.logs.writer import McapWriter
 from wallkit.maps.read import load_map
 from wallkit.pipelines.outputs import result_folder
 from wallkit.pipelines.run_folder import sha256, write_json
+from wallkit.pipelines.simulate_sensors import START_NS, Message, Play, Sensor, Serialized, sensors_of
 from wallkit.pipelines.simulate_world import world_from_map
-from wallkit.simulate.crowd import STEP_S, People, people_from
+from wallkit.simulate.crowd import STEP_S, people_from
 from wallkit.simulate.floor import floor_of
-from wallkit.simulate.odometry import odometry_of
-from wallkit.simulate.robot import DEFAULT_ROBOT, Robot, robot_from_urdf
+from wallkit.simulate.robot import DEFAULT_ROBOT, robot_from_urdf
 from wallkit.simulate.route import drive
-from wallkit.simulate.scanner import Sweep, sweep
-from wallkit.simulate.scenario import LidarSetup, OdometrySetup, Scenario, Timing
-from wallkit.simulate.scene import NOTHING, Scene
-from wallkit.simulate.stage import StatesAt, door_states, populated, staged
-from wallkit.simulate.timing import Schedule, schedule
-from wallkit.simulate.world import World
+from wallkit.simulate.scenario import Scenario
+from wallkit.simulate.scene import Scene
+from wallkit.simulate.stage import door_states, populated, staged
 
-START_NS = 1_700_000_000_000_000_000
 _TRUTH_HZ = 100.0
 Progress = Callable[[int], None]
 
@@ -50,66 +43,6 @@ class LogRequest:
     scenario: Scenario
     robot_path: Path = DEFAULT_ROBOT
     seed: int = 0
-
-
-@dataclass(frozen=True, eq=False)
-class Play:
-    """Everything that is decided before the first measurement.
-
-    Attributes:
-        stamps_ns, poses: (T,), (T, 3) where the robot truly is, T_map_base, at 100 Hz from START_NS on.
-        rngs: a generator for each sensor, so that one more of them changes nothing in the others.
-    """
-
-    request: LogRequest
-    robot: Robot
-    world: World
-    scene: Scene
-    people: People
-    states_at: StatesAt
-    stamps_ns: Int64Array
-    poses: Float64Array
-    rngs: dict[str, np.random.Generator]
-
-    @property
-    def duration_s(self) -> float:
-        return float(self.stamps_ns[-1] - self.stamps_ns[0]) / 1e9
-
-    def place(self, at_ns: int) -> None:
-        """Puts people and doors where they are at a moment."""
-        time_s = (at_ns - START_NS) / 1e9
-        self.scene.place({**self.world.poses(self.states_at(time_s)), **self.people.posed(time_s)})
-
-    def pose_at(self, at_ns: int) -> Float64Array:
-        """(3,) T_map_base."""
-        return np.asarray(interpolate_poses(self.stamps_ns, self.poses, [at_ns])[0])
-
-
-class Sensor(Protocol):
-    """Something on the robot that measures now and then."""
-
-    @property
-    def schedule(self) -> Schedule: ...
-
-    def measure(self, at_ns: int, stamp_ns: int) -> Iterable[Message]:
-        """What it publishes of a moment."""
-        ...
-
-
-@dataclass(frozen=True)
-class Serialized:
-    """A message that no core type stands for, as its ROS type and CDR bytes."""
-
-    type_name: str
-    data: bytes
-
-
-@dataclass(frozen=True)
-class Message:
-    """One message of a log."""
-
-    topic: str
-    value: Value | Serialized
 
 
 @dataclass(frozen=True)
@@ -140,7 +73,7 @@ def prepare(request: LogRequest) -> Play:
     paces = poses[:: round(STEP_S * _TRUTH_HZ)]
     people = people_from(rngs["people"], scenario.crowd, floor_of(world, with_doors=False), paces)
     world = populated(world, people)
-    return Play(request, robot, world, Scene(world), people, states_at, stamps_ns, poses, rngs)
+    return Play(scenario, robot, world, Scene(world), people, states_at, stamps_ns, poses, rngs)
 
 
 def simulate_log(
@@ -158,137 +91,17 @@ def simulate_log(
         play = prepare(request)
         sensors = sensors_of(play)
         with McapWriter(folder / "log.mcap") as file:
-            _write_static(file, play, sensors)
+            _write_static(file, play)
             counts = _write(file, _measured(sensors, play, progress))
         write_tum(folder / "truth.tum", Trajectory(play.stamps_ns[::5], play.poses[::5]))
         (folder / "map.wkmap.urdf").write_bytes(request.map_path.read_bytes())
         steps = np.hypot(*np.diff(play.poses[:, :2], axis=0).T)
         dropped = {name: sensor.schedule.dropped for name, sensor in sensors.items()}
         done = Simulated(play.duration_s, counts, dropped, float(steps.sum()), len(play.people.agents))
-        write_json(folder / "manifest.json", _manifest(play, done))
+        write_json(folder / "manifest.json", _manifest(request, play, done))
         # the mark by which --overwrite knows a folder of ours
         write_json(folder / "run.json", {"schema": 1, "command": "simulate log", "seed": request.seed})
     return done
-
-
-def sensors_of(play: Play) -> dict[str, Sensor]:
-    """The sensors of the scenario by name."""
-    scenario = play.request.scenario
-    return {
-        "truth": TruthSensor(play, _schedule(play, "truth", Timing(), 50.0)),
-        "odometry": OdometrySensor(
-            play,
-            scenario.odometry,
-            _schedule(play, "odometry", scenario.odometry.timing, scenario.odometry.rate_hz),
-        ),
-        "lidar": LidarSensor(
-            play, scenario.lidar, _schedule(play, "lidar", scenario.lidar.timing, scenario.lidar.scanner.rate_hz)
-        ),
-    }
-
-
-def _schedule(play: Play, name: str, timing: Timing, rate_hz: float) -> Schedule:
-    return schedule(play.rngs[name], timing, rate_hz, play.duration_s)
-
-
-# -------------------------------------------------------------------------------------------- sensors
-
-
-@dataclass(frozen=True, eq=False)
-class TruthSensor:
-    """The pose nobody has on a real robot: /ground_truth/pose, T_map_base."""
-
-    play: Play
-    schedule: Schedule
-
-    def measure(self, at_ns: int, stamp_ns: int) -> Iterator[Message]:
-        yield Message("/ground_truth/pose", StampedPose(stamp_ns, "map", self.play.pose_at(at_ns)))
-
-
-@dataclass(frozen=True, eq=False)
-class OdometrySensor:
-    """Wheel odometry: /odom and the transform odom -> base on /tf."""
-
-    play: Play
-    setup: OdometrySetup
-    schedule: Schedule
-    _claimed: dict[int, Float64Array] = field(init=False, default_factory=dict)
-
-    def __post_init__(self) -> None:
-        # every tick counts, also those whose message is lost
-        play, rate_hz = self.play, self.setup.rate_hz
-        ticks = START_NS + np.round(np.arange(0, play.duration_s, 1 / rate_hz) * 1e9).astype(np.int64)
-        claimed = odometry_of(
-            play.rngs["odometry"], self.setup.wheels, interpolate_poses(play.stamps_ns, play.poses, ticks), rate_hz
-        )
-        at = interpolate_poses(ticks, claimed, START_NS + self.schedule.times_ns)
-        self._claimed.update(zip((START_NS + self.schedule.times_ns).tolist(), at, strict=True))
-
-    def measure(self, at_ns: int, stamp_ns: int) -> Iterator[Message]:
-        pose, base = self._claimed[at_ns], self.play.robot.base
-        yield Message("/odom", Odometry(stamp_ns, pose, child_frame_id=base))
-        yield Message("/tf", (Transform(stamp_ns, "odom", base, matrix_from_pose(pose)),))
-
-
-@dataclass(frozen=True, eq=False)
-class LidarSensor:
-    """A planar LiDAR: /scan, and on /oracle/scan_points where each return truly came from."""
-
-    play: Play
-    setup: LidarSetup
-    schedule: Schedule
-
-    @property
-    def frame(self) -> str:
-        return self.play.robot.lidar_frame(self.setup.frame)
-
-    def measure(self, at_ns: int, stamp_ns: int) -> Iterator[Message]:
-        done = self.sweep(at_ns, stamp_ns)
-        yield Message("/scan", done.scan)
-        yield Message("/oracle/scan_points", _oracle(self.play.scene, done))
-
-    def sweep(self, at_ns: int, stamp_ns: int) -> Sweep:
-        """One sweep that truly begins at a moment and says another."""
-        T_base_lidar = self.play.robot.frames[self.frame] @ _leaning(self.setup.roll_rad, self.setup.pitch_rad)
-
-        def T_map_lidar_at(now_ns: int) -> Float64Array:
-            return np.asarray(matrix_from_pose(self.play.pose_at(now_ns)) @ T_base_lidar)
-
-        done = sweep(
-            self.play.rngs["lidar"],
-            self.setup.scanner,
-            self.play.scene,
-            at_ns,
-            T_map_lidar_at,
-            place_at=self.play.place,
-            frame_id=self.frame,
-        )
-        return replace(done, scan=replace(done.scan, stamp_ns=stamp_ns))
-
-
-def _leaning(roll_rad: float, pitch_rad: float) -> Float64Array:
-    from scipy.spatial.transform import Rotation
-
-    T = np.eye(4)
-    T[:3, :3] = Rotation.from_euler("yx", [pitch_rad, -roll_rad]).as_matrix()
-    return T
-
-
-def _oracle(scene: Scene, done: Sweep) -> Serialized:
-    """The returns as a cloud in the LiDAR's frame with the beam, class and thing of each; -1: of none."""
-    scan = done.scan
-    returned = np.isfinite(scan.ranges_m)
-    ranges, bearings = scan.ranges_m[returned], scan.angles_rad[returned]
-    solids = done.solids[returned]
-    columns = {
-        "x": ranges * np.cos(bearings),
-        "y": ranges * np.sin(bearings),
-        "z": np.zeros_like(ranges),
-        "beam": np.flatnonzero(returned),
-        "label": scene.labels(solids, scene.class_ids),
-        "instance": scene.labels(solids, scene.instance_ids),
-    }
-    return Serialized("sensor_msgs/msg/PointCloud2", cloud_message(scan.stamp_ns, scan.frame_id, columns))
 
 
 # -------------------------------------------------------------------------------------------- the log
@@ -330,7 +143,7 @@ def _write(file: McapWriter, messages: Iterable[tuple[int, Message]]) -> dict[st
     return counts
 
 
-def _write_static(file: McapWriter, play: Play, sensors: dict[str, Sensor]) -> None:
+def _write_static(file: McapWriter, play: Play) -> None:
     """What holds for the whole log: where the sensors are said to be, and what the oracle's numbers mean."""
     robot = play.robot
     transforms = tuple(
@@ -343,11 +156,10 @@ def _write_static(file: McapWriter, play: Play, sensors: dict[str, Sensor]) -> N
     file.write("/oracle/names", json.dumps(names), START_NS, is_latched=True)
 
 
-def _manifest(play: Play, done: Simulated) -> dict[str, Any]:
+def _manifest(request: LogRequest, play: Play, done: Simulated) -> dict[str, Any]:
     """manifest.json: from what the log was made, so that anyone makes it again."""
     import mujoco
 
-    request = play.request
     return {
         "schema": 1,
         "wallkit": wallkit.__version__,

@@ -41,7 +41,7 @@ class Floor:
         return np.where(is_on, self.clearance_m[row, column], 0.0)
 
     def free_points(self, radius_m: float) -> Float64Array:
-        """(P, 2) centres of the cells inside where something of that radius can be: of those that it can go between, most."""
+        """(P, 2) centres of the largest region of cells inside that something of that radius can go about in."""
         from scipy.ndimage import label
 
         usable = (self.clearance_m > radius_m) & self.is_inside

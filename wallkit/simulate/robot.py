@@ -83,7 +83,8 @@ def robot_from_urdf(path: Path = DEFAULT_ROBOT) -> Robot:
         links = [link.name for link in urdf.robot.links]
         base = next((name for name in _BASES if name in links), urdf.base_link)
         frames = {name: np.asarray(urdf.get_transform(name, base), dtype=np.float64) for name in links}
-    except Exception as error:  # noqa: BLE001 - the library raises whatever it trips over
+    # the library raises whatever it trips over
+    except Exception as error:
         raise SimulationError(
             f"cannot be read as a robot: {error}", where=str(path), hint="check it with `wallkit calib from-urdf`"
         ) from error

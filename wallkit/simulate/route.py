@@ -14,7 +14,6 @@ from wallkit.core.types import Float64Array
 from wallkit.errors import SimulationError
 from wallkit.simulate.floor import CELL_M, Floor
 
-
 _STEP_S = 0.01
 _LOOKAHEAD_M = 0.35
 _TURN_IN_PLACE_RAD = 0.9
@@ -94,7 +93,7 @@ def _corners(rng: np.random.Generator, route: Route, floor: Floor) -> Float64Arr
             "the route has one waypoint", where=floor.source, hint="name at least two, or none for a route by chance"
         )
     round_trip = [*waypoints, waypoints[0]] if route.laps > 1 else waypoints
-    legs = list(zip(round_trip, round_trip[1:], strict=False)) * route.laps
+    legs = list(pairwise(round_trip)) * route.laps
     corners = [np.array([legs[0][0]])]
     for start, end in legs:
         way = np.array([start, end]) if route.direct else floor.way(start, end, route.radius_m)

@@ -33,7 +33,7 @@ class LidarSetup:
     roll_rad: float = setting(0.0, "it truly leans so far to its left from where the URDF says", low=-0.5, high=0.5)
     pitch_rad: float = setting(0.0, "it truly looks so far down", low=-0.5, high=0.5)
     scanner: Scanner = section(Scanner, "beams, range and faults")
-    timing: Timing = section(Timing, "rate is scanner.rate_hz")
+    timing: Timing = section(Timing, "when it measures; its rate is scanner.rate_hz")
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class OdometrySetup:
 
     rate_hz: float = setting(20.0, "messages per second", low=1, high=500)
     wheels: WheelOdometry = section(WheelOdometry, "noise, wheel sizes, slip")
-    timing: Timing = section(Timing, "")
+    timing: Timing = section(Timing, "when it measures")
 
 
 @dataclass(frozen=True)
@@ -88,8 +88,8 @@ class Scenario:
     duration_s: float = setting(0.0, "the log ends then, or when the route does; 0: with the route", low=0)
     route: Route = section(Route, "where the robot goes")
     crowd: Crowd = section(Crowd, "who else is there")
-    lidar: LidarSetup = section(LidarSetup, "")
-    odometry: OdometrySetup = section(OdometrySetup, "")
+    lidar: LidarSetup = section(LidarSetup, "the LiDAR")
+    odometry: OdometrySetup = section(OdometrySetup, "wheel odometry")
     doors: tuple[DoorPlan, ...] = tables(DoorPlan, "doors that move, or stand otherwise than the map says")
     moved: tuple[Moved, ...] = tables(Moved, "things that stand elsewhere than the map says")
     missing: tuple[Missing, ...] = tables(Missing, "things that are only in the map")
