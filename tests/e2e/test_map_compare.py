@@ -103,3 +103,14 @@ def test_merge_refuses_to_leave_something_hanging(run_here, tmp_path):
     assert done.code == 1
     assert "broken by the merge: WK-G004" in done.out
     assert not (tmp_path / "m.urdf").exists()
+
+
+def test_merge_follows_what_the_verb_renamed(run_here, tmp_path):
+    """`map rename` also renames the joint and the parts that are named after the link."""
+    assert run_here("rename", "c.urdf", "desk", "table").code == 0
+    for ours, theirs in (("b", "c"), ("c", "b")):
+        done = run_here("merge", "a.urdf", f"{ours}.urdf", f"{theirs}.urdf", "-o", "m.urdf", "--overwrite")
+        assert done.code == 0, done.out
+        data = (tmp_path / "m.urdf").read_bytes()
+        assert b"desk" not in data
+        assert b'xyz="2 1.5 0"' in data

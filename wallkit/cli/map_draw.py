@@ -17,7 +17,12 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path), metavar="FILE")
 @common.out_option
-@click.option("--findings", "with_findings", is_flag=True, help="Mark what `map validate` finds, by number and code.")
+@click.option(
+    "--findings",
+    "with_findings",
+    is_flag=True,
+    help="Mark the errors and warnings of `map validate`, by number and code.",
+)
 @click.option("--z", "plane", metavar="M|lidar", help="Bold what a plane at this height cuts, all else light.")
 @click.option("--names", is_flag=True, help="Write every link's name beside it.")
 @click.option("--width", "width_px", type=click.IntRange(200, 8000), default=1000, show_default=True, help="In pixels.")

@@ -18,7 +18,9 @@ _PNG_COLOURS = 64
 
 
 def map_with_findings(path: Path, selection: Selection | None) -> tuple[SemanticMap, tuple[MapFinding, ...]]:
-    """The map; with a selection also what the rules say, and then the map as far as it can be read.
+    """The map; with a selection also the errors and warnings of the rules, and then the map as far as it can be read.
+
+    What is only said for information would bury them: `wallkit map validate` lists it.
 
     Raises:
         MapError: the file cannot be read, is not XML, or (without a selection) is not sound as URDF.
@@ -29,7 +31,7 @@ def map_with_findings(path: Path, selection: Selection | None) -> tuple[Semantic
     if report.map is None:
         first = report.findings[0]
         raise MapError(f"{first.code} {first.message}", where=f"{path}:{first.line}:{first.column}", hint=first.hint)
-    return report.map, report.findings
+    return report.map, tuple(finding for finding in report.findings if finding.severity != "info")
 
 
 def plane_of(semantic_map: SemanticMap, word: str | None) -> float | None:
