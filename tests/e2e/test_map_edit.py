@@ -7,7 +7,7 @@ import subprocess
 import pytest
 
 from tests.e2e.conftest import Done
-from tests.maps.test_edit import CUT, FLOOR, SPLIT
+from tests.maps.floor import CUT, FLOOR, SPLIT
 from wallkit.cli.app import main
 from wallkit.maps.edit.verbs import VERBS
 from wallkit.maps.rules import validate
