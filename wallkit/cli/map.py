@@ -10,6 +10,7 @@ import click
 
 from wallkit.cli import common
 from wallkit.cli.map_add import add, new
+from wallkit.cli.map_audit import audit
 from wallkit.cli.map_compare import diff, fmt, merge
 from wallkit.cli.map_draw import show
 from wallkit.cli.map_edit import array, move, remove, rename, reparent, rotate, set_
@@ -271,7 +272,7 @@ for command in (
     *(new, add, array, move, rotate, rename, reparent, remove, set_),
     *(cut, fill, split, join, snap),
     *(adopt, scale, origin),
-    *(info, ls, tree, show, measure, slice_, compat),
+    *(info, ls, tree, show, measure, slice_, audit, compat),
     *(fmt, diff, merge, import_, export),
 ):
     map_group.add_command(command)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from wallkit.maps import rules
 from wallkit.maps.document import Edit, apply_edits
 from wallkit.maps.rules.base import PREREQUISITES, FixClass, MapFinding
-from wallkit.maps.rules.engine import Report, codes_matching
+from wallkit.maps.rules.engine import Report
 from wallkit.maps.rules.tolerances import Tolerances
 
 # the milder classes that come with each; what is risky is shown to the user, and made by hand
@@ -53,8 +53,7 @@ def repair(
     Raises:
         ConfigError: no rule begins with a selector.
     """
-    codes = codes_matching(select, rules.RULES) if select else set(rules.RULES)
-    codes -= codes_matching(ignore, rules.RULES)
+    codes = rules.selected_codes(select, ignore, with_log=False)
     # rules that repair nothing are not asked: some take seconds
     codes = {code for code in codes if rules.RULES[code].fix in CLASSES[kind]}
     if not codes:

@@ -66,7 +66,7 @@ def fields_from_map(
     Raises:
         MapError: no height is known, nothing is there to be seen, or the map is too large for such cells.
     """
-    z_m = _height_m(semantic_map, scan_plane_m)
+    z_m = height_m(semantic_map, scan_plane_m)
     floor = floor_at(semantic_map, z_m)
     surfaces = surfaces_at(semantic_map, floor)
     ends = floor.cut.segments.reshape(-1, 2)
@@ -78,6 +78,22 @@ def fields_from_map(
     cells = np.where(solid, 100, np.where(is_free, 0, -1)).astype(np.int8)
     source = semantic_map.source
     return DrawnMap(FieldSet(distances, is_free, cell_m, origin, source), OccupancyGrid(cells, cell_m, origin, source))
+
+
+def height_m(semantic_map: SemanticMap, given_m: float | None) -> float:
+    """The LiDAR's height above the floor: the one given, else what the map says.
+
+    Raises:
+        MapError: neither does.
+    """
+    z_m = semantic_map.header.scan_plane_m if given_m is None else given_m
+    if z_m is None:
+        raise MapError(
+            "the map does not say at which height the LiDAR cuts it",
+            where=semantic_map.source,
+            hint='<wk:map scan_plane="0.30" ...> in the map, or --set maps.scan_plane_m=0.30',
+        )
+    return z_m
 
 
 def distances_to_segments(
@@ -131,17 +147,6 @@ class _Distances(Mapping[str, Float32Array]):
         extra_m = np.where(p >= COUNTS_IN_FULL, 0.0, self._sigma_m * np.sqrt(-2.0 * np.log(np.minimum(p, 1.0))))
         at = self._lattice
         return distances_to_segments(segments, extra_m, at.low, at.cell_m, (at.rows, at.columns))
-
-
-def _height_m(semantic_map: SemanticMap, given_m: float | None) -> float:
-    z_m = semantic_map.header.scan_plane_m if given_m is None else given_m
-    if z_m is None:
-        raise MapError(
-            "the map does not say at which height the LiDAR cuts it",
-            where=semantic_map.source,
-            hint='<wk:map scan_plane="0.30" ...> in the map, or --set maps.scan_plane_m=0.30',
-        )
-    return z_m
 
 
 @njit(cache=True, nogil=True)

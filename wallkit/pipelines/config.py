@@ -10,6 +10,7 @@ from typing import Any
 from wallkit.core.config import Source, build, read_toml, section, setting, source_from_words
 from wallkit.localize.settings import LocalizeSettings
 from wallkit.logs.sync import SyncConfig
+from wallkit.maps.audit_settings import AuditSettings
 from wallkit.maps.fields import MapsSettings
 from wallkit.maps.rules.tolerances import Tolerances
 from wallkit.pipelines.evaluate import EvaluateSettings
@@ -27,6 +28,7 @@ class Config:
     logs: SyncConfig = section(SyncConfig, "how messages become frames")
     maps: MapsSettings = section(MapsSettings, "how maps become fields")
     rules: Tolerances = section(Tolerances, "where the rules of `wallkit map validate` draw the line")
+    audit: AuditSettings = section(AuditSettings, "how `wallkit map audit` compares a map with a log")
     points: PointsSettings = section(PointsSettings, "which returns are trusted")
     localize: LocalizeSettings = section(LocalizeSettings, "the filter")
     evaluate: EvaluateSettings = section(EvaluateSettings, "when an estimate is right or wrong")

@@ -8,11 +8,13 @@ from __future__ import annotations
 import datetime
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from wallkit.errors import ConfigError, MapError, closest
 from wallkit.maps.document import Document
 from wallkit.maps.labels import Labels
 from wallkit.maps.rules import (
+    audit,
     cells,
     doors,
     fills,
@@ -43,6 +45,9 @@ from wallkit.maps.rules.engine import Report, codes_matching, run
 from wallkit.maps.rules.tolerances import Tolerances
 from wallkit.maps.xml import parse
 
+if TYPE_CHECKING:
+    from wallkit.maps.audit_nouns import Evidence
+
 _GROUPS = (
     *(xml_bytes.RULES, schema.RULES, values.RULES, graph.RULES, joints.RULES),
     *(scale.RULES, shapes.RULES, junctions.RULES, placement.RULES),
@@ -51,6 +56,7 @@ _GROUPS = (
     *(taxonomy.RULES, vocabulary.RULES),
     *(slices.RULES, cells.RULES),
     *(portability.RULES, references.RULES, rasters.RULES),
+    *(audit.RULES,),
 )
 
 RULES: dict[str, Rule] = {rule.code: rule for group in _GROUPS for rule in sorted(group, key=lambda rule: rule.code)}
@@ -105,13 +111,46 @@ def validate(
         source = str(file)
     else:
         data = file
-    selected = codes_matching(select, RULES) if select else set(RULES)
-    selected -= codes_matching(ignore, RULES)
+    selected = selected_codes(select, ignore, with_log=False)
     is_raster = Path(source).suffix.lower() in RASTER_SUFFIXES
     document = Document(source, data) if is_raster else parse(data, source)
     context = Context(document, tolerances or Tolerances(), in_set=in_set, labels=labels)
     fitting = [rule for rule in RULES.values() if (rule.group == "R") == is_raster]
     return run(context, fitting, selected & {rule.code for rule in fitting}, today=today)
+
+
+def audit_against(
+    document: Document,
+    evidence: Evidence,
+    tolerances: Tolerances,
+    *,
+    select: Sequence[str] = (),
+    ignore: Sequence[str] = (),
+    today: datetime.date | None = None,
+) -> Report:
+    """What the rules of group A say about a map, by the evidence of a log; arguments as for `validate`.
+
+    Raises:
+        ConfigError: no rule of group A begins with a selector.
+    """
+    context = Context(document, tolerances, evidence=evidence)
+    return run(context, list(RULES.values()), selected_codes(select, ignore, with_log=True), today=today)
+
+
+def selected_codes(select: Sequence[str], ignore: Sequence[str], *, with_log: bool) -> set[str]:
+    """The codes of the rules that are asked for, of those that need a log or of those that do not.
+
+    Raises:
+        ConfigError: no rule begins with a selector, or all that do are of the other kind.
+    """
+    codes = {code for code, rule in RULES.items() if rule.needs_log == with_log}
+    for selector in select:
+        if not codes_matching([selector], RULES) & codes:
+            what = "only speaks without a log" if with_log else "needs a log"
+            hint = "wallkit map validate MAP" if with_log else "wallkit map audit MAP LOG"
+            raise ConfigError(f"'{selector}' {what}", hint=hint)
+    chosen = codes_matching(select, RULES) if select else codes
+    return (chosen & codes) - codes_matching(ignore, RULES)
 
 
 def explain(code: str) -> str:

@@ -18,6 +18,7 @@ from wallkit.maps.document import Attribute, Document, Edit, Element, Span
 from wallkit.maps.rules.tolerances import Tolerances
 
 if TYPE_CHECKING:
+    from wallkit.maps.audit_nouns import Evidence
     from wallkit.maps.geometry import Part, Slice
     from wallkit.maps.labels import Labels
     from wallkit.maps.model import SemanticMap
@@ -40,6 +41,8 @@ PREREQUISITES: Mapping[str, str] = {
     "P": "X",
     # of rasters, which are no XML: no other group runs on them, and this one on nothing else
     "R": "",
+    # against a log
+    "A": "XSG",
 }
 
 
@@ -79,6 +82,7 @@ class Rule:
         fix: class of its repairs; None when it never has one.
         blocks: an error of it leaves the later groups nothing sound to judge, so they are skipped.
         is_last: it runs after all others and sees which inline ignores were used.
+        needs_log: it judges what a log says about the map, so it only runs where there is a log (`wallkit map audit`).
     """
 
     code: str
@@ -87,6 +91,7 @@ class Rule:
     fix: FixClass | None = None
     blocks: bool = True
     is_last: bool = False
+    needs_log: bool = False
 
     @property
     def group(self) -> str:
@@ -145,6 +150,7 @@ class Context:
         in_set: the file is one level of several.
         labels: of the segmentation model, by id; None when none are given.
         unused_ignores: for rules that run last: (<wk:ignore>, the code in it that matched nothing).
+        evidence: what a log says about the map, for the rules of group A; None without a log.
     """
 
     document: Document
@@ -152,6 +158,7 @@ class Context:
     in_set: bool = False
     labels: Labels | None = None
     unused_ignores: list[tuple[Element, str]] = field(default_factory=list)
+    evidence: Evidence | None = None
     _made: dict[Callable[[Context], Any], Any] = field(default_factory=dict, repr=False)
 
     def once(self, make: Callable[[Context], T]) -> T:

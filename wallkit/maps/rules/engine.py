@@ -90,6 +90,8 @@ def run(
 ) -> Report:
     """Runs the rules group by group; rules that are not selected run only where others depend on their group.
 
+    Rules that need a log are left out without one.
+
     Args:
         selected: codes whose findings are reported.
         today: inline ignores that ended before it no longer count; without it they never end.
@@ -102,6 +104,8 @@ def run(
         reason = next((blocked[before] for before in PREREQUISITES[group] if before in blocked), None)
         for rule in rules:
             if rule.group != group or rule.is_last or group not in needed:
+                continue
+            if rule.needs_log and context.evidence is None:
                 continue
             if reason is not None:
                 skipped.append(Skipped(rule.code, f"{reason.code} at {reason.line}:{reason.column}"))

@@ -62,3 +62,6 @@ class Tolerances:
     cell_m: float = setting(0.05, "cell size of rasters made from the map (WK-L005, L011, L012)", low=1e-3)
     # P
     geometries: int = setting(1000, "more make other tools slow (WK-P008)", low=1)
+    # A
+    audit_shift_m: float = setting(0.02, "an element that is off by less is where it is drawn (WK-A003)", low=0)
+    audit_unsupported_m: float = setting(0.5, "so much of a wall must be missing to be told (WK-A001)", low=0)
