@@ -14,9 +14,10 @@ from wallkit.errors import MapError
 from wallkit.maps.classes import ClassInfo
 from wallkit.maps.document import apply_edits
 from wallkit.maps.draft import DraftOpening, DraftWall
-from wallkit.maps.edit import place
+from wallkit.maps.edit import place, snap
 from wallkit.maps.edit.add import add_class, add_fixture, add_room, add_wall
 from wallkit.maps.edit.add_openings import DoorWords, Place, add_door
+from wallkit.maps.edit.adopt import adopt
 from wallkit.maps.edit.changes import number_like
 from wallkit.maps.edit.copy import array
 from wallkit.maps.edit.cut import cut, fill
@@ -29,6 +30,8 @@ from wallkit.maps.edit.values import set_values
 from wallkit.maps.edit.verbs import VERBS
 from wallkit.maps.edit.walls import join, split
 from wallkit.maps.rules import validate
+from wallkit.maps.rules.base import Context
+from wallkit.maps.xml import parse
 
 
 def test_the_map_drawn_here_is_clean():
@@ -372,3 +375,48 @@ def test_edits_one_after_another_leave_a_map_that_yourdfpy_places_alike(restroom
     assert set(poses) == set(context_of(data).map.links)
     for link, T in poses.items():
         np.testing.assert_allclose(robot.get_transform(link, "map"), T, atol=1e-9)
+
+
+def test_no_verb_falls_over_a_faulty_file(data):
+    """Refused with a hint, or made and still to be parsed; never a traceback, never a number that is none."""
+    refused = made = 0
+    for path in sorted((data / "maps/malformed").glob("*/*.urdf")):
+        document = parse(path.read_bytes(), path.name)
+        if document.root is None:
+            continue
+        for verb, *args in (
+            (move, "toilet_1", (0.1, 0, 0)),
+            (rotate, "wall_e", 0.1),
+            (
+                remove,
+                "wall_mid",
+            ),
+            (reparent, "sink_1", "map"),
+            (rename, "wall_mid", "w"),
+            (array, "urinal_1", 3, (-0.7, 0, 0)),
+            (cut, "wall_s", P1),
+            (fill, "d1"),
+            (split, "wall_mid", 2.5),
+            (join, "wall_s", "wall_n"),
+            (scale, 0.001),
+            (reorigin, (1.0, 2.0, 0.3)),
+            (adopt,),
+            (snap.straighten,),
+            (set_values, "door_m", {"class": "wall"}),
+            (add_wall, DraftWall("new", (1, 1), (2, 1), 0.1)),
+            (add_fixture, "sink", "new"),
+        ):
+            try:
+                changes = verb(Context(document), *args)
+            except MapError as error:
+                refused += 1
+                hints = error.hint
+            else:
+                made += 1
+                after = apply_edits(document.data, changes.edits)
+                assert parse(after).root is not None, (path.name, verb)
+                assert after.count(b"nan") <= document.data.count(b"nan"), (path.name, verb)
+                hints = "made"
+            assert hints, (path.name, verb)
+    assert refused > 100
+    assert made > 300

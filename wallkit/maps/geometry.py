@@ -161,6 +161,11 @@ def parts(
     if not found:
         return []
     T_map_shape = np.array([pose for *_, pose in found]) @ np.array([shape.T_link_shape for _, shape, *_ in found])
+    # what hangs on numbers that cannot be read has no place
+    is_placed = np.isfinite(T_map_shape).all(axis=(1, 2))
+    if not is_placed.any():
+        return []
+    T_map_shape, found = T_map_shape[is_placed], [one for one, ok in zip(found, is_placed, strict=True) if ok]
     corners = [
         _corners_of(shape) @ T[:3, :3].T + T[:3, 3] for (_, shape, *_), T in zip(found, T_map_shape, strict=True)
     ]

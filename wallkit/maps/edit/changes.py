@@ -93,7 +93,7 @@ def declared(document: Document, lines: Sequence[str] = ("<wk:",)) -> tuple[Edit
     if root is None or prefix_of(document) is not None or not any("<wk:" in line for line in lines):
         return ()
     behind_name = root.offset + 1 + len(root.name.encode(document.encoding))
-    return (Edit(behind_name, 0, f' xmlns:wk="{WK_NAMESPACE}"'.encode()),)
+    return (Edit(behind_name, 0, f' xmlns:{_written_prefix(document)}="{WK_NAMESPACE}"'.encode()),)
 
 
 def prefix_of(document: Document) -> str | None:
@@ -234,10 +234,17 @@ def _insert(document: Document, at: int, text: str) -> Edit:
     return Edit(at, 0, text.encode(document.encoding))
 
 
+def _written_prefix(document: Document) -> str:
+    """The prefix for wallkit's elements: the file's, else wk where that is free."""
+    root = document.root
+    is_taken = root is not None and any(a.name == "xmlns:wk" for a in root.attributes)
+    return prefix_of(document) or ("wkmap" if is_taken else "wk")
+
+
 def _indented(document: Document, lines: Sequence[str], indent: str) -> str:
     """The lines, each behind a line end, moved to an indentation; the first one tells theirs."""
     own = len(lines[0]) - len(lines[0].lstrip(" ")) if lines else 0
-    prefix = prefix_of(document) or "wk"
+    prefix = _written_prefix(document)
     moved = [indent + (line[own:] if not line[:own].strip() else line.lstrip(" ")) for line in lines]
     text = "".join(f"{newline_of(document)}{line}" for line in moved)
     return text.replace("<wk:", f"<{prefix}:").replace("</wk:", f"</{prefix}:")
