@@ -7,7 +7,7 @@ import random
 import pytest
 import shapely
 
-from tests.maps.floor import CUT, FLOOR, SPLIT, context_of, differ_m2, done, pose, solid
+from tests.maps.floor import CUT, FLOOR, JUDGED, SPLIT, context_of, differ_m2, done, pose, solid
 from wallkit.errors import MapError
 from wallkit.maps.draft import DraftOpening
 from wallkit.maps.edit import cut as cutting
@@ -74,7 +74,7 @@ def test_a_declared_opening_is_cut_where_its_boxes_stand_in_it():
         b'<collision name="wall_s.run">',
         b'<wk:opening id="p1" kind="passage" along="0.5 1.5" z="0 2.1"/>\n    <collision name="wall_s.run">',
     )
-    assert "WK-O001" in {f.code for f in validate(data).findings}
+    assert "WK-O001" in {f.code for f in validate(data, select=JUDGED).findings}
     assert done(data, cutting.cut_declared, "p1", "wall_s") == CUT
 
 
@@ -88,7 +88,7 @@ def test_an_opening_moves_with_its_door():
         data = done(data, verb, *args)
     assert b'along="1.50 2.40"' in data
     assert pose(data, "door_1")[:2] == pytest.approx([1.51, 2.1])
-    findings = [f for f in validate(data).findings if f.severity != "info"]
+    findings = [f for f in validate(data, select=JUDGED).findings if f.severity != "info"]
     assert findings == []
 
 
@@ -107,7 +107,7 @@ def test_a_door_of_any_kind_is_clean(motion, hinge, swing):
     # doors of 0.8 m in the middle of the south wall: a sliding leaf has its own width beside it on both sides
     words = DoorWords("door_x", motion, swing, hinge)
     after = done(FLOOR, add_door, Place("wall_s", (1.7, 2.5), (0, 2.1)), words)
-    assert [f.message for f in validate(after).findings if f.severity != "info"] == []
+    assert [f.message for f in validate(after, select=JUDGED).findings if f.severity != "info"] == []
     semantic_map = context_of(after).map
     joints = [joint for joint in semantic_map.joints.values() if joint.child.startswith("door_x")]
     opened = semantic_map.poses({joint.name: joint.upper for joint in joints if joint.mimic is None})
@@ -123,7 +123,7 @@ def test_a_door_of_any_kind_is_clean(motion, hinge, swing):
 def test_a_door_fills_an_opening_that_is_there():
     after = done(CUT, add_door, Place("wall_s", opening="p1"), DoorWords("gate"))
     assert b'kind="door" along="0.5 1.5" z="0 2.1" fill="gate"' in after
-    assert [f for f in validate(after).findings if f.severity != "info"] == []
+    assert [f for f in validate(after, select=JUDGED).findings if f.severity != "info"] == []
     with pytest.raises(MapError, match=r"is 1 m wide; 1.2 m was asked for"):
         add_door(context_of(CUT), Place("wall_s", (0.5, 1.7), (0, 2.1), "p1"), DoorWords())
     with pytest.raises(MapError, match="is filled by 'door_1'"):
@@ -145,7 +145,7 @@ def test_split_parts_what_stands_on_each_side():
     for link in ("sink_1", "door_1"):
         assert pose(SPLIT, link) == pytest.approx(pose(FLOOR, link), abs=1e-6)
     assert pose(SPLIT, "wall_mid_b") == pytest.approx([2.5, 2.05, 0, 0], abs=1e-6)
-    assert [f for f in validate(SPLIT).findings if f.severity != "info"] == []
+    assert [f for f in validate(SPLIT, select=JUDGED).findings if f.severity != "info"] == []
 
 
 @pytest.mark.parametrize(
@@ -159,4 +159,4 @@ def test_split_then_join_is_the_same_geometry(wall, at):
     for link in context_of(FLOOR).map.links:
         assert pose(joined, link) == pytest.approx(pose(FLOOR, link), abs=2e-6)
     assert len(context_of(joined).map.links[wall].shapes) == len(context_of(FLOOR).map.links[wall].shapes)
-    assert [f for f in validate(joined).findings if f.severity != "info"] == []
+    assert [f for f in validate(joined, select=JUDGED).findings if f.severity != "info"] == []

@@ -10,15 +10,17 @@ from pathlib import Path
 from wallkit.errors import MapError, OutputError
 from wallkit.maps.document import apply_edits
 from wallkit.maps.draft_write import write_draft
-from wallkit.maps.edit.changes import Step
+from wallkit.maps.edit.changes import Step, appended
 from wallkit.maps.edit.templates import TemplateSizes, new_draft
-from wallkit.maps.rules import validate
+from wallkit.maps.rules import RULES, validate
 from wallkit.maps.rules.base import Context, MapFinding
 from wallkit.maps.rules.tolerances import Tolerances
 from wallkit.maps.xml import parse
 from wallkit.pipelines.map import SUFFIX, read_bytes, unified_diff
 from wallkit.pipelines.outputs import write_whole
 
+# what is wrong with a room because it is empty: ambiguous poses, one direction only
+_OF_EMPTY_ROOMS = ("WK-L003", "WK-L004")
 # the groups that an edit can upset at once; localizability is for `validate`
 _JUDGED = ("X", "S", "G", "E", "O", "T", "C", "P")
 
@@ -94,10 +96,29 @@ def new_file(path: Path, template: str, sizes: TemplateSizes, *, name: str = "",
     rooms = ", ".join(f"{room.id}" for room in draft.rooms)
     counts = f"{len(draft.walls)} walls, {len(draft.fixtures)} fixtures, rooms {rooms}"
     said = f"{template} of {sizes.length_m:g} x {sizes.width_m:g} m: {counts}"
-    return EditedFile(path, b"", write_draft(draft), (said,), ())
+    data, ignored = _said_empty(path, write_draft(draft))
+    return EditedFile(path, b"", data, (said, *ignored), ())
 
 
 # ------------------------------------------------------------------------------------------------- details
+
+
+def _said_empty(path: Path, data: bytes) -> tuple[bytes, tuple[str, ...]]:
+    """A new map, with the rules of localizability that it breaks ignored in its header, and a word on that.
+
+    An empty rectangle looks the same from both ends, and nothing is wrong with it: what will stand in it is still missing.
+    Once that does, WK-S016 says that the ignore is no longer used.
+    """
+    codes = [code for code in _OF_EMPTY_ROOMS if code in RULES]
+    findings = validate(data, select=codes, source=str(path)).findings if codes else ()
+    found = sorted({finding.code for finding in findings if finding.severity != "info"})
+    header = _context(path, data, Tolerances()).map.header.element
+    if not found or header is None:
+        return data, ()
+    reason = "as yet nothing stands in it that tells one end from the other"
+    line = f'    <wk:ignore rule="{" ".join(found)}" reason="{reason}"/>'
+    said = f"{' and '.join(found)} ignored for now: {reason}"
+    return apply_edits(data, appended(header, [line])), (said,)
 
 
 def _context(path: Path, data: bytes, tolerances: Tolerances) -> Context:
