@@ -99,7 +99,7 @@ def e005_tall_wall(context: Context) -> Iterator[Problem]:
     for run in context.once(sound_runs):
         if run.height_m > context.tolerances.tall_m:
             message = f"wall '{run.link}' is {run.height_m:.3g} m high"
-            spot = run.parts[0].shape.geometry.spot("size")
+            spot = max(run.parts, key=lambda part: part.z_m[1]).shape.geometry.spot("size")
             yield Problem(spot, message, "write one file per level", xyz=tuple((run.start + run.end) / 2))
 
 
