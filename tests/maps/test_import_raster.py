@@ -157,3 +157,11 @@ def test_intels_raster_is_explained_to_a_quarter_of_a_cell_in_both_directions(da
 def test_the_rasters_own_oddities_are_passed_on(data):
     imported = read_map_raster(data / "maps/pgm/depot.yaml", ImportOptions())
     assert "WK-R002" in {n.code for n in imported.notes}
+
+
+def test_two_pixels_with_one_middle_end_a_line():
+    # an end was once followed in no direction, for ever
+    band = np.array([[0, 1, 1, 1], [0, 0, 0, 0], [1, 0, 0, 1], [0, 1, 0, 1]], dtype=bool)
+    lines = middle_lines(band, 0.75)
+    assert all(line.min() >= 0 and line.max() <= 4 for line in lines)
+    assert max(float(np.hypot(*(line[-1] - line[0]))) for line in lines) > 1.0

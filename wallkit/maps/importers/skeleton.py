@@ -51,7 +51,8 @@ def middle_lines(band: BoolArray, tolerance_cells: float) -> list[Float64Array]:
         is_loop = len(chain) > 2 and chain[0] == chain[-1]
         line = _simplified(path, tolerance_cells, is_loop=is_loop)
         for end, before, pixel in ((0, 1, chain[0]), (-1, -2, chain[-1])):
-            if len(graph[pixel]) == 1 and len(line) > 1:
+            # two pixels can have one middle, and then there is no direction to go on in
+            if len(graph[pixel]) == 1 and len(line) > 1 and (line[end] != line[before]).any():
                 line[end] = _last_inside(band, line[end], line[end] - line[before])
         lines.append(line)
     return lines
@@ -59,7 +60,7 @@ def middle_lines(band: BoolArray, tolerance_cells: float) -> list[Float64Array]:
 
 def _last_inside(band: BoolArray, point: Float64Array, direction: Float64Array) -> Float64Array:
     """The last point in a direction that is still on the band: thinning takes half a band's width off its ends."""
-    step = direction / max(float(np.hypot(*direction)), 1e-9) * STEP_CELLS
+    step = direction / float(np.hypot(*direction)) * STEP_CELLS
     onward = point + step
     while 0 <= onward[0] < band.shape[1] and 0 <= onward[1] < band.shape[0] and band[int(onward[1]), int(onward[0])]:
         point, onward = onward, onward + step
