@@ -86,21 +86,27 @@ class System:
     """Normal equations, weighted: blocks of the camera (C), the views (V) and between, and the gradients.
 
     Attributes:
-        cc: (P, P). vv: (G, 6, 6). cv: (G, P, 6). gc: (G, P) of each view. gv: (G, 6).
+        cc_views: (G, P, P) of each view. vv: (G, 6, 6). cv: (G, P, 6). gc: (G, P) of each view. gv: (G, 6).
     """
 
-    cc: Float64Array
+    cc_views: Float64Array
     vv: Float64Array
     cv: Float64Array
     gc: Float64Array
     gv: Float64Array
+
+    @property
+    def cc(self) -> Float64Array:
+        """(P, P) of all views."""
+        return np.asarray(self.cc_views.sum(axis=0))
 
     def reduced(self, damping: float = 0.0) -> tuple[Float64Array, Float64Array, Float64Array]:
         """Schur complement (P, P), the views' reduced gradients (G, P), and vv^-1 cv' (G, 6, P)."""
         bounded = self.vv + damping * self.vv * np.eye(6)
         gain = np.linalg.solve(bounded, np.swapaxes(self.cv, 1, 2))
         scores = self.gc - np.einsum("gpv,gv->gp", np.swapaxes(gain, 1, 2), self.gv)
-        schur = self.cc + damping * self.cc * np.eye(len(self.cc)) - (self.cv @ gain).sum(axis=0)
+        cc = self.cc
+        schur = cc + damping * cc * np.eye(len(cc)) - (self.cv @ gain).sum(axis=0)
         return np.asarray(schur), np.asarray(scores), np.asarray(gain)
 
 
@@ -114,7 +120,7 @@ def normal_equations(fit: Fit, seen: Observations, free: BoolArray) -> System:
 
     e = fit.residuals[:, :, None]
     return System(
-        summed(by_camera, by_camera).sum(axis=0),
+        summed(by_camera, by_camera),
         summed(by_pose, by_pose),
         summed(by_camera, by_pose),
         summed(by_camera, e)[:, :, 0],
