@@ -37,7 +37,7 @@ def naive_covariance(system: System, fit: Fit, free: BoolArray) -> Float64Array:
     schur, scores, _ = system.reduced()
     degrees = 2 * len(fit.residuals) - int(free.sum()) - 6 * len(scores)
     variance = float((fit.weights[:, None] * fit.residuals**2).sum()) / max(1, degrees)
-    return _whole(variance * np.linalg.inv(schur), free)
+    return _whole(np.asarray(variance * np.linalg.inv(schur)), free)
 
 
 def _whole(covariance: Float64Array, free: BoolArray) -> Float64Array:

@@ -64,7 +64,7 @@ def find_roughly(grey: UInt8Array, board: Board, *, width: int = 400) -> Float64
 
     step = max(1, round(grey.shape[1] / width))
     small: Any = cv2.resize(grey, None, fx=1 / step, fy=1 / step, interpolation=cv2.INTER_AREA) if step > 1 else grey
-    found = _FINDERS[board.kind](small, board) if board.kind != "chessboard" else _classic(small, board, fast=True)
+    found = _FINDERS[board.kind](small, board) if board.kind != "chessboard" else _classic(small, board)
     if found is None or len(found[0]) < _FEWEST_CORNERS:
         return None
     return np.asarray((found[1] + 0.5) * step - 0.5)
@@ -109,10 +109,11 @@ def _chessboard(grey: UInt8Array, board: Board) -> Found:
     return _classic(grey, board) or _sectors(grey, board)
 
 
-def _classic(grey: UInt8Array, board: Board, *, fast: bool = False) -> Found:
+def _classic(grey: UInt8Array, board: Board) -> Found:
     import cv2
 
-    flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE | (cv2.CALIB_CB_FAST_CHECK if fast else 0)
+    # the fast check of OpenCV rejects most tilted boards of a shrunken frame
+    flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
     is_found, pixels = cv2.findChessboardCorners(grey, board.grid, flags=flags)
     return _in_order(grey, pixels, board) if is_found else None
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wallkit.calib.bundle import MAX_ITERATIONS, Fit, adjust, first_fit, homography, normal_equations
+from wallkit.calib.bundle import Fit, adjust, first_fit, homography, normal_equations
 from wallkit.calib.camera_covariance import clustered_covariance, naive_covariance
 from wallkit.calib.views import Capture, Observations, View, observations_of
 from wallkit.core.camera import Camera
 from wallkit.core.lenses import CAMERAS
-from wallkit.core.types import BoolArray, Float64Array
+from wallkit.core.types import BoolArray, Float64Array, Int64Array
 from wallkit.errors import CalibrationError, closest
 
 _GUESSES = (0.5, 0.8, 1.2)
@@ -95,8 +95,8 @@ def calibrate(capture: Capture, model: str) -> Intrinsics:
     corners, fit, kept, allowed = 0, plain, seen, int(_MOST_REJECTED * len(views))
     for _ in range(_ROUNDS):
         fit = adjust(fit, kept, free=free, huber_px=3 * robust_sigma(fit))
-        bad_views = _bad_views(fit, kept, views, allowed - len(rejected))
         bad_corners = _bad_corners(fit, kept)
+        bad_views = _bad_views(fit, kept, ~bad_corners, allowed - len(rejected))
         if not bad_views and not bad_corners.any():
             break
         rejected |= {views[i].name: why for i, why in bad_views.items()}
@@ -128,10 +128,18 @@ def free_parameters(model: str) -> BoolArray:
     return np.array([True] * 4 + [name in chosen.estimated for name in CAMERAS[chosen.lens].coefficients])
 
 
-def fit_cameras(model: str, capture: Capture, seen: Observations) -> Fit:
-    """A robust fit without rejection, for judging models and halves of the data against each other."""
+def fit_cameras(model: str, capture: Capture, seen: Observations, *, near: Camera | None = None) -> Fit:
+    """A robust fit without rejection, for judging models and halves of the data against each other.
+
+    Args:
+        near: the only start, where one is known (the camera of all views, for most of them); None: several.
+    """
     free = free_parameters(model)
-    start, _ = _best_start(model, capture, seen, free)
+    start = first_fit(near, seen) if near is not None else None
+    if start is None or not np.isfinite(start.cost):
+        start, _ = _best_start(model, capture, seen, free)
+    else:
+        start = adjust(start, seen, free=free)
     return adjust(start, seen, free=free, huber_px=3 * max(robust_sigma(start), 1e-6))
 
 
@@ -165,7 +173,9 @@ def _best_start(model: str, capture: Capture, seen: Observations, free: BoolArra
     lens = MODELS[model].lens
     fits: dict[str, Fit] = {}
     for name, focal_px in _focal_guesses(capture, seen).items():
-        start = first_fit(_plain_camera("equidistant" if lens == "equidistant" else "plumb_bob", focal_px, capture), seen)
+        start = first_fit(
+            _plain_camera("equidistant" if lens == "equidistant" else "plumb_bob", focal_px, capture), seen
+        )
         if start is None or not np.isfinite(start.cost):
             continue
         first = free if lens != "rational_polynomial" else free_parameters("plumb_bob")
@@ -198,13 +208,12 @@ def _focal_from_homographies(capture: Capture, seen: Observations) -> float | No
         rows = seen.views == view
         H = homography(seen.points[rows, :2], (seen.pixels[rows] - middle) / capture.width)
         a, b = H[:, 0] / np.linalg.norm(H[:, 0]), H[:, 1] / np.linalg.norm(H[:, 1])
-        # a and b are perpendicular and of equal length after division by the focal length
+        # right angle and equal lengths with diag(1/f^2, 1/f^2, 1) between: plane + f^2 depth = 0, in least squares
         plane = np.array([a[:2] @ b[:2], a[:2] @ a[:2] - b[:2] @ b[:2]])
         depth = np.array([a[2] * b[2], a[2] ** 2 - b[2] ** 2])
         top -= float(plane @ depth)
         bottom += float(depth @ depth)
     share2 = top / bottom if bottom > 0 else -1.0
-    # x = plane / f^2 + depth = 0 in least squares gives 1 / f^2 = -plane.depth / plane.plane; this is its mirror
     return float(np.sqrt(share2) * capture.width) if 0.04 < share2 < 25 else None
 
 
@@ -222,13 +231,17 @@ def _as_rational(camera: Camera) -> Camera:
 # -------------------------------------------------------------------------------------------------------- rejection
 
 
-def _bad_views(fit: Fit, seen: Observations, views: list[View], allowed: int) -> dict[int, str]:
-    """Views far worse than the others -> why; the worst first, no more than allowed."""
-    rms = rms_by_view(fit, seen)
+def _bad_views(fit: Fit, seen: Observations, good: BoolArray, allowed: int) -> dict[int, str]:
+    """Views far worse than the others by their good corners -> why; the worst first, no more than allowed."""
+    squared = np.where(good, (fit.residuals**2).sum(axis=1), 0.0)
+    counts = np.bincount(seen.views, good, seen.count)
+    rms = np.sqrt(np.bincount(seen.views, squared, seen.count) / np.maximum(counts, 1))
     middle = float(np.median(rms))
     spread = _SIGMA_PER_MAD * float(np.median(np.abs(rms - middle)))
     z = (rms - middle) / max(spread, 0.1 * middle, 1e-9)
-    worst = [int(i) for i in np.argsort(-rms, kind="stable") if rms[i] > _VIEW_RMS_FACTOR * middle or z[i] > _VIEW_MAD_Z]
+    worst = [
+        int(i) for i in np.argsort(-rms, kind="stable") if rms[i] > _VIEW_RMS_FACTOR * middle or z[i] > _VIEW_MAD_Z
+    ]
     return {i: f"RMS {rms[i]:.3f} px, the median is {middle:.3f} px" for i in worst[: max(0, allowed)]}
 
 
@@ -240,7 +253,7 @@ def _bad_corners(fit: Fit, seen: Observations) -> BoolArray:
     return np.asarray(bad & (shares <= _MOST_REJECTED)[seen.views])
 
 
-def _without(fit: Fit, seen: Observations, good: Float64Array, bad: BoolArray) -> tuple[Fit, Observations]:
+def _without(fit: Fit, seen: Observations, good: Int64Array, bad: BoolArray) -> tuple[Fit, Observations]:
     kept = Observations(seen.points[~bad], seen.pixels[~bad], seen.views[~bad]).of_views(good)
     rows = ~bad & np.isin(seen.views, good)
     poses = fit.poses[good]

@@ -6,6 +6,7 @@ import click
 
 from wallkit.cli.calib_board import board
 from wallkit.cli.calib_convert import convert
+from wallkit.cli.calib_intrinsics import intrinsics
 
 
 @click.group()
@@ -13,5 +14,5 @@ def calib() -> None:
     """Calibrate cameras and the place of a LiDAR to them, and say how far the result may be trusted."""
 
 
-for command in (board, convert):
+for command in (board, intrinsics, convert):
     calib.add_command(command)
