@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.calib.drawn import BOARD, DISTORTIONS, board_poses, camera, capture_of
-from wallkit.calib.boards import board_from
+from wallkit.calib.boards import Board, board_from
 from wallkit.calib.bundle import Fit, adjust, first_fit, jacobians, moved, normal_equations
 from wallkit.calib.camera_covariance import clustered_covariance, naive_covariance
 from wallkit.calib.camera_coverage import coverage_of
@@ -245,7 +245,8 @@ def test_the_most_informative_views_are_better_than_the_first(noisy):
 
 def test_a_good_capture_passes_and_a_poor_one_cannot_tell(noisy):
     rng = np.random.default_rng(4)
-    rich = capture_of(board_poses(rng, 40, spread=0.8), 0.1, rng)
+    small = Board("chessboard", 6, 5, 0.02)
+    rich = capture_of(board_poses(rng, 50, small, spread=0.6), 0.03, rng, board=small)
 
     def judged(capture):
         found = calibrate(capture, "plumb_bob")
