@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from wallkit.calib.boards import Board, board_from, opencv_board
 from wallkit.calib.bundle import homography
 from wallkit.calib.detect import find_corners, find_roughly
-from wallkit.calib.sheet import Sheet, pdf_from_sheet, sheet_of, svg_from_sheet
+from wallkit.calib.sheet import PAPERS, Sheet, pdf_from_sheet, sheet_of, svg_from_sheet
 from wallkit.errors import CalibrationError
 
 BOARDS = [
@@ -185,3 +186,12 @@ def test_a_file_that_describes_no_board_is_refused_by_name(text, says, tmp_path)
     with pytest.raises(CalibrationError, match=says) as raised:
         board_from(str(tmp_path / "b.toml"))
     assert "b.toml" in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    "path", sorted((Path(__file__).parents[2] / "calib/boards").glob("*.toml")), ids=lambda p: p.stem
+)
+def test_the_boards_of_the_repository_are_whole_and_fit_the_paper_they_name(path):
+    sheet = sheet_of(board_from(str(path)))
+    if path.stem[-2:] in ("a3", "a4"):
+        assert tuple(sorted((sheet.width_mm, sheet.height_mm))) == PAPERS[path.stem[-2:].upper()]

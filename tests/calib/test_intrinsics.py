@@ -246,7 +246,7 @@ def test_the_most_informative_views_are_better_than_the_first(noisy):
 def test_a_good_capture_passes_and_a_poor_one_cannot_tell(noisy):
     rng = np.random.default_rng(4)
     small = Board("chessboard", 6, 5, 0.02)
-    rich = capture_of(board_poses(rng, 50, small, spread=0.6), 0.03, rng, board=small)
+    rich = capture_of(board_poses(rng, 60, small, spread=0.7), 0.03, rng, board=small)
 
     def judged(capture):
         found = calibrate(capture, "plumb_bob")
