@@ -37,7 +37,6 @@ MODELS = ["auto", "k1k2", "radtan", "plumb_bob", "rational_polynomial", "equidis
 @click.option("--frame", default="", help="Optical frame of the camera in the result.")
 @common.out_option
 @click.option("--ros", type=click.Path(path_type=Path), metavar="FILE", help="Also write a ROS camera_info YAML.")
-@click.option("--report", type=click.Path(path_type=Path), metavar="FILE", help="Also write an HTML page with figures.")
 @common.overwrite_option
 @common.json_option
 @common.quiet_option
@@ -56,7 +55,6 @@ def intrinsics(
     frame: str,
     out: Path | None,
     ros: Path | None,
-    report: Path | None,
     overwrite: bool,
     as_json: bool,
     quiet: bool,
@@ -72,7 +70,7 @@ def intrinsics(
     \b
     Examples:
       wallkit calib intrinsics log.mcap --board board.toml -o front.toml
-      wallkit calib intrinsics pictures/ --board chessboard:9x6:0.025 -o front.toml --ros front.yaml --report front.html
+      wallkit calib intrinsics pictures/ --board chessboard:9x6:0.025 -o front.toml --ros front.yaml
       wallkit calib intrinsics corners.npz --size 1920x1208 --board chessboard:7x5:0.095 --model equidistant --json
     """
     from wallkit.calib.boards import board_from
@@ -81,7 +79,7 @@ def intrinsics(
     from wallkit.pipelines.outputs import check_file_out
 
     board, size = board_from(board_words), _size(size_words)
-    for path in (p for p in (out, ros, report) if p is not None):
+    for path in (p for p in (out, ros) if p is not None):
         check_file_out(path, overwrite=overwrite)
     if dry_run:
         click.echo(f"would look for {board.words} in {', '.join(map(str, inputs))} and write {out or 'nothing'}")
@@ -90,7 +88,7 @@ def intrinsics(
     request = CaptureRequest(inputs, board, topic, size, half_window)
     with common.progress("searching", None, quiet=quiet) as update:
         result = calibrate_camera(request, model=model, name=name, frame=frame, command=words, progress=update)
-    _write(result, out, ros, report)
+    _write(result, out, ros)
     if as_json:
         common.emit(document(result))
     else:
@@ -107,17 +105,13 @@ def _size(words: str) -> tuple[int, int] | None:
     return int(found[1]), int(found[2])
 
 
-def _write(result: CameraResult, out: Path | None, ros: Path | None, report: Path | None) -> None:
+def _write(result: CameraResult, out: Path | None, ros: Path | None) -> None:
     from wallkit.calib.store import text_from_calibration
     from wallkit.pipelines.outputs import write_whole
 
     for path, form in ((out, "toml"), (ros, "ros")):
         if path is not None:
             write_whole(path, text_from_calibration(result.calibration, form).encode())
-    if report is not None:
-        from wallkit.pipelines.calib_report import camera_page
-
-        write_whole(report, camera_page(result))
 
 
 def _lines(result: CameraResult) -> list[str]:
