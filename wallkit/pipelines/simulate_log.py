@@ -21,7 +21,8 @@ from wallkit.logs.writer import McapWriter
 from wallkit.maps.read import load_map
 from wallkit.pipelines.outputs import result_folder
 from wallkit.pipelines.run_folder import sha256, write_json
-from wallkit.pipelines.simulate_sensors import START_NS, Message, Play, Sensor, Serialized, sensors_of
+from wallkit.pipelines.simulate_play import START_NS, Message, Play, Sensor, Serialized
+from wallkit.pipelines.simulate_sensors import sensors_of
 from wallkit.pipelines.simulate_world import world_from_map
 from wallkit.simulate.crowd import STEP_S, people_from
 from wallkit.simulate.floor import floor_of
@@ -73,7 +74,7 @@ def prepare(request: LogRequest) -> Play:
     paces = poses[:: round(STEP_S * _TRUTH_HZ)]
     people = people_from(rngs["people"], scenario.crowd, floor_of(world, with_doors=False), paces)
     world = populated(world, people)
-    return Play(scenario, robot, world, Scene(world), people, states_at, stamps_ns, poses, rngs)
+    return Play(scenario, robot, world, Scene(world), people, states_at, stamps_ns, poses, rngs, request.seed)
 
 
 def simulate_log(

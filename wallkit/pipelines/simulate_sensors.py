@@ -2,93 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import zlib
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 import numpy as np
 
 from wallkit.core.geometry import interpolate_poses, matrix_from_pose
-from wallkit.core.types import Float64Array, Int64Array, Odometry, StampedPose, Transform
+from wallkit.core.types import Float64Array, Odometry, StampedPose, Transform
 from wallkit.logs.encode import cloud_message
-from wallkit.logs.message import Value
-from wallkit.simulate.crowd import People
+from wallkit.pipelines.simulate_camera import CameraSensor
+from wallkit.pipelines.simulate_play import START_NS, Message, Play, Sensor, Serialized
 from wallkit.simulate.odometry import odometry_of
-from wallkit.simulate.robot import Robot
 from wallkit.simulate.scanner import Sweep, sweep
-from wallkit.simulate.scenario import LidarSetup, OdometrySetup, Scenario, Timing
+from wallkit.simulate.scenario import LidarSetup, OdometrySetup, Timing
 from wallkit.simulate.scene import Scene
-from wallkit.simulate.stage import StatesAt
 from wallkit.simulate.timing import Schedule, schedule
-from wallkit.simulate.world import World
 
-START_NS = 1_700_000_000_000_000_000
 _TRUTH_MESSAGES_HZ = 50.0
-
-
-@dataclass(frozen=True, eq=False)
-class Play:
-    """Everything that is decided before the first measurement.
-
-    Attributes:
-        stamps_ns, poses: (T,), (T, 3) where the robot truly is, T_map_base, at 100 Hz from START_NS on.
-        rngs: a generator for each sensor, so that one more of them changes nothing in the others.
-    """
-
-    scenario: Scenario
-    robot: Robot
-    world: World
-    scene: Scene
-    people: People
-    states_at: StatesAt
-    stamps_ns: Int64Array
-    poses: Float64Array
-    rngs: dict[str, np.random.Generator]
-
-    @property
-    def duration_s(self) -> float:
-        return float(self.stamps_ns[-1] - self.stamps_ns[0]) / 1e9
-
-    def place(self, at_ns: int) -> None:
-        """Puts people and doors where they are at a moment."""
-        time_s = (at_ns - START_NS) / 1e9
-        self.scene.place({**self.world.poses(self.states_at(time_s)), **self.people.posed(time_s)})
-
-    def pose_at(self, at_ns: int) -> Float64Array:
-        """(3,) T_map_base."""
-        return np.asarray(interpolate_poses(self.stamps_ns, self.poses, [at_ns])[0])
-
-
-class Sensor(Protocol):
-    """Something on the robot that measures now and then."""
-
-    @property
-    def schedule(self) -> Schedule: ...
-
-    def measure(self, at_ns: int, stamp_ns: int) -> Iterable[Message]:
-        """What it publishes of a moment."""
-        ...
-
-
-@dataclass(frozen=True)
-class Serialized:
-    """A message that no core type stands for, as its ROS type and CDR bytes."""
-
-    type_name: str
-    data: bytes
-
-
-@dataclass(frozen=True)
-class Message:
-    """One message of a log."""
-
-    topic: str
-    value: Value | Serialized
 
 
 def sensors_of(play: Play) -> dict[str, Sensor]:
     """The sensors of the scenario by name."""
     scenario = play.scenario
+    cameras = {
+        f"camera {setup.name}": CameraSensor(
+            play, setup, _schedule(play, f"camera {setup.name}", setup.timing, setup.rate_hz)
+        )
+        for setup in scenario.cameras
+    }
     return {
         "truth": TruthSensor(play, _schedule(play, "truth", Timing(), _TRUTH_MESSAGES_HZ)),
         "odometry": OdometrySensor(
@@ -99,11 +41,13 @@ def sensors_of(play: Play) -> dict[str, Sensor]:
         "lidar": LidarSensor(
             play, scenario.lidar, _schedule(play, "lidar", scenario.lidar.timing, scenario.lidar.scanner.rate_hz)
         ),
+        **cameras,
     }
 
 
 def _schedule(play: Play, name: str, timing: Timing, rate_hz: float) -> Schedule:
-    return schedule(play.rngs[name], timing, rate_hz, play.duration_s)
+    rng = play.rngs.get(name) or np.random.default_rng([play.seed, zlib.crc32(name.encode())])
+    return schedule(rng, timing, rate_hz, play.duration_s)
 
 
 # -------------------------------------------------------------------------------------------- sensors

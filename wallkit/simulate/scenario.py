@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from wallkit.core.config import build, read_toml, section, setting, source_from_words, tables
 from wallkit.simulate.crowd import Crowd
+from wallkit.simulate.looks import Looks
 from wallkit.simulate.odometry import WheelOdometry
+from wallkit.simulate.photo import Photo
 from wallkit.simulate.route import Route
 from wallkit.simulate.scanner import Scanner
 
@@ -34,6 +37,34 @@ class LidarSetup:
     pitch_rad: float = setting(0.0, "it truly looks so far down", low=-0.5, high=0.5)
     scanner: Scanner = section(Scanner, "beams, range and faults")
     timing: Timing = section(Timing, "when it measures; its rate is scanner.rate_hz")
+
+
+@dataclass(frozen=True)
+class CameraSetup:
+    """A camera: where it is, its lens, what it does wrong, and when. Its K and D are those it publishes."""
+
+    name: str = setting("front", "of the camera, in its topics /camera/NAME/...")
+    frame: str = setting("", "its optical frame in the robot's URDF; else the one with its name in it, or the only one")
+    width: int = setting(640, "of the picture [px]", low=8, high=8192)
+    height: int = setting(480, "of the picture [px]", low=8, high=8192)
+    hfov_deg: float = setting(75.0, "what it sees across, before distortion, when no K is given", low=1, high=200)
+    K: tuple[float, ...] = setting((), "fx, fy, cx, cy [px]; none: of hfov_deg, in the middle of the picture")
+    model: str = setting("plumb_bob", "of its lens: plumb_bob, rational_polynomial or equidistant")
+    D: tuple[float, ...] = setting((), "distortion as the model has it; none: zeros")
+    rate_hz: float = setting(10.0, "pictures per second", low=0.01, high=200)
+    masks: Literal["none", "raster", "exact"] = setting(
+        "none", "what each pixel shows, on /oracle/NAME/...: by the renderer, or exactly by rays (and without OpenGL)"
+    )
+    glass: Literal["surface", "through"] = setting("surface", "a pixel on a pane is labelled as glass, or as what is behind")
+    pictures: bool = setting(True, "false: masks only, which needs no OpenGL")
+    off_mm: tuple[float, float, float] = setting(
+        (0.0, 0.0, 0.0), "it truly is so far from where the URDF says, along its own axes: right, down, forward"
+    )
+    off_deg: tuple[float, float, float] = setting((0.0, 0.0, 0.0), "and turned about these axes, as a rotation vector")
+    focal_error: float = setting(0.0, "its true focal lengths are larger than published, relative", low=-0.5, high=0.5)
+    centre_error_px: tuple[float, float] = setting((0.0, 0.0), "its true principal point is off the published one")
+    photo: Photo = section(Photo, "exposure, colour, blur, noise")
+    timing: Timing = section(Timing, "when it takes pictures")
 
 
 @dataclass(frozen=True)
@@ -90,6 +121,8 @@ class Scenario:
     crowd: Crowd = section(Crowd, "who else is there")
     lidar: LidarSetup = section(LidarSetup, "the LiDAR")
     odometry: OdometrySetup = section(OdometrySetup, "wheel odometry")
+    looks: Looks = section(Looks, "how the world looks to cameras")
+    cameras: tuple[CameraSetup, ...] = tables(CameraSetup, "the cameras; none: a log without pictures")
     doors: tuple[DoorPlan, ...] = tables(DoorPlan, "doors that move, or stand otherwise than the map says")
     moved: tuple[Moved, ...] = tables(Moved, "things that stand elsewhere than the map says")
     missing: tuple[Missing, ...] = tables(Missing, "things that are only in the map")

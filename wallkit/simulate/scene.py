@@ -50,12 +50,7 @@ class Scene:
     def __init__(self, world: World, *, spec: mujoco.MjSpec | None = None) -> None:
         mujoco = mujoco_module()
         self.world = world
-        try:
-            self.model = (spec or spec_from_world(world)).compile()
-        except ValueError as error:
-            raise SimulationError(
-                f"MuJoCo does not take this world: {error}", where=world.source, hint="see the named shape in the map"
-            ) from error
+        self.model = compiled(spec or spec_from_world(world), world)
         self.data = mujoco.MjData(self.model)
         self._mocap = {body.name: int(self.model.body(body.name).mocapid[0]) for body in world.bodies}
         self.solid_of_geom = np.full(self.model.ngeom, NOTHING, dtype=np.int64)
@@ -69,24 +64,26 @@ class Scene:
         Raises:
             KeyError: no such body.
         """
-        from scipy.spatial.transform import Rotation
+        pose_mocap(self.model, self.data, self._mocap, poses)
 
-        mujoco = mujoco_module()
-        if poses:
-            rows = [self._mocap[name] for name in poses]
-            matrices = np.stack(list(poses.values()))
-            self.data.mocap_pos[rows] = matrices[:, :3, 3]
-            self.data.mocap_quat[rows] = Rotation.from_matrix(matrices[:, :3, :3]).as_quat(scalar_first=True)
-        mujoco.mj_kinematics(self.model, self.data)
+    def cast(
+        self,
+        origin: Float64Array,
+        directions: Float64Array,
+        *,
+        unseen: tuple[Light, ...] = (),
+        is_camera: bool = False,
+    ) -> Hits:
+        """What rays from one point (3,) along unit directions (K, 3) meet first, solids of some kinds left out.
 
-    def cast(self, origin: Float64Array, directions: Float64Array, *, unseen: tuple[Light, ...] = ()) -> Hits:
-        """What rays from one point (3,) along unit directions (K, 3) meet first, solids of some kinds left out."""
+        A camera also sees what no LiDAR meets.
+        """
         mujoco = mujoco_module()
         count = len(directions)
         geoms, ranges = np.full(count, NOTHING, dtype=np.int32), np.zeros(count)
         normals = np.zeros(3 * count)
         groups = np.zeros(6, dtype=np.uint8)
-        groups[[GROUPS[light] for light in _RAYS_SEE if light not in unseen]] = 1
+        groups[[GROUPS[light] for light in (GROUPS if is_camera else _RAYS_SEE) if light not in unseen]] = 1
         rays = np.ascontiguousarray(directions, dtype=np.float64).ravel()
         cutoff = 1e6
         mujoco.mj_multiRay(
@@ -145,8 +142,36 @@ def spec_from_world(world: World) -> mujoco.MjSpec:
     for body in world.bodies:
         carriers[body.name] = spec.worldbody.add_body(name=body.name, mocap=True)
     for number, solid in enumerate(world.solids):
-        _add_geom(spec, carriers[solid.body], solid, number)
+        add_primitive(spec, carriers[solid.body], solid, name=_geom_name(number), group=GROUPS[solid.light])
     return spec
+
+
+def compiled(spec: mujoco.MjSpec, world: World) -> mujoco.MjModel:
+    """The model of a spec.
+
+    Raises:
+        SimulationError: MuJoCo does not take it, with its message.
+    """
+    try:
+        return spec.compile()
+    except ValueError as error:
+        raise SimulationError(
+            f"MuJoCo does not take this world: {error}", where=world.source, hint="see the named shape in the map"
+        ) from error
+
+
+def pose_mocap(
+    model: mujoco.MjModel, data: mujoco.MjData, mocap: Mapping[str, int], poses: Mapping[str, Float64Array]
+) -> None:
+    """Puts bodies (by name, T_map_body (4, 4)) where they are; `mocap` has the rows of the bodies."""
+    from scipy.spatial.transform import Rotation
+
+    if poses:
+        rows = [mocap[name] for name in poses]
+        matrices = np.stack(list(poses.values()))
+        data.mocap_pos[rows] = matrices[:, :3, 3]
+        data.mocap_quat[rows] = Rotation.from_matrix(matrices[:, :3, :3]).as_quat(scalar_first=True)
+    mujoco_module().mj_kinematics(model, data)
 
 
 def mujoco_module() -> Any:
@@ -171,20 +196,14 @@ def _geom_name(number: int) -> str:
     return f"solid{number}"
 
 
-def _add_geom(spec: mujoco.MjSpec, body: Any, solid: Solid, number: int) -> None:
+def add_primitive(spec: mujoco.MjSpec, body: Any, solid: Solid, **more: Any) -> None:
+    """A solid as a geom of its body that nothing collides with."""
     mujoco = mujoco_module()
     types = mujoco.mjtGeom
     position, quaternion = _place(solid.T_body_solid)
-    common: dict[str, Any] = {
-        "name": _geom_name(number),
-        "pos": position,
-        "quat": quaternion,
-        "group": GROUPS[solid.light],
-        "contype": 0,
-        "conaffinity": 0,
-    }
+    common = {"pos": position, "quat": quaternion, "contype": 0, "conaffinity": 0, **more}
     if solid.kind == "mesh":
-        name = f"mesh{number}"
+        name = f"mesh of {more['name']}"
         spec.add_mesh(
             name=name,
             file=str(solid.mesh),

@@ -1,0 +1,210 @@
+"""A play and its cameras -> pictures, masks and camera_info of any moment. `render` is the door to all of it."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from wallkit.core.camera import Camera
+from wallkit.core.geometry import matrix_from_pose
+from wallkit.core.types import CameraImage, CameraInfo, Float64Array, Int64Array
+from wallkit.errors import CalibrationError, SimulationError, closest
+from wallkit.pipelines.simulate_play import Message, Play
+from wallkit.simulate.camera import Masks, Shot, Unit, photograph, shot_of, solids_by_raster, solids_by_rays
+from wallkit.simulate.photo import jpeg_from_pixels
+from wallkit.simulate.robot import Robot
+from wallkit.simulate.scenario import CameraSetup
+from wallkit.simulate.scene import NOTHING
+from wallkit.simulate.timing import Schedule
+
+# what a mask's pixel says that shows nothing
+NO_CLASS, NO_INSTANCE = 255, 65535
+
+
+def render(
+    play: Play,
+    camera: Unit | str,
+    at_ns: int,
+    *,
+    masks: Masks = "exact",
+    pictures: bool = True,
+    T_map_optical: Float64Array | None = None,
+) -> Shot:
+    """What a camera sees at a moment: its image, and the class and instance of every pixel.
+
+    Args:
+        camera: one of the scenario's by its name, or a unit of your own (see `unit_of`).
+        at_ns: people and doors are where they are then; START_NS is the beginning.
+        masks: exact by rays; raster by the renderer, ten times as fast; none: all pixels show nothing.
+        pictures: False: masks only; exact ones need no OpenGL.
+        T_map_optical: (4, 4) where the camera is; None: where the robot carries it.
+
+    Raises:
+        SimulationError: no such camera, or a picture is asked for and no OpenGL works.
+    """
+    unit = camera if isinstance(camera, Unit) else unit_named(play, camera)
+
+    def place_of_camera(now_ns: int) -> Float64Array:
+        if T_map_optical is not None:
+            return T_map_optical
+        return np.asarray(matrix_from_pose(play.pose_at(now_ns)) @ unit.T_base_true)
+
+    image = None
+    if pictures:
+        times = _open_shutter(unit, at_ns)
+        rng = np.random.default_rng([play.seed, zlib.crc32(unit.name.encode()), at_ns])
+        image = photograph(
+            rng, play.studio, unit, [place_of_camera(t) for t in times], lambda k: play.place_studio(times[k])
+        )
+    T = place_of_camera(at_ns)
+    if masks == "exact":
+        play.place(at_ns)
+        solids = solids_by_rays(play.scene, unit, T)
+    elif masks == "raster":
+        play.place_studio(at_ns)
+        solids = solids_by_raster(play.studio, unit, T)
+    else:
+        solids = np.full((unit.true.height, unit.true.width), NOTHING, dtype=np.int64)
+    return shot_of(play.scene, image, solids)
+
+
+def unit_named(play: Play, name: str) -> Unit:
+    """One of the scenario's cameras.
+
+    Raises:
+        SimulationError: there is none of that name.
+    """
+    units = units_of(play.robot, play.scenario.cameras)
+    if name not in units:
+        raise SimulationError(
+            f"the scenario has no camera '{name}'", hint=closest(name, units) if units else "add a [[cameras]] table"
+        )
+    return units[name]
+
+
+def units_of(robot: Robot, setups: tuple[CameraSetup, ...]) -> dict[str, Unit]:
+    """The cameras of a scenario by name.
+
+    Raises:
+        SimulationError: two have one name, a frame is not the robot's, or a lens cannot be.
+    """
+    found: dict[str, Unit] = {}
+    for setup in setups:
+        if setup.name in found:
+            raise SimulationError(f"two [[cameras]] are called '{setup.name}'", hint="give each a name of its own")
+        found[setup.name] = unit_of(robot, setup)
+    return found
+
+
+def unit_of(robot: Robot, setup: CameraSetup) -> Unit:
+    """A camera of a scenario on a robot.
+
+    Raises:
+        SimulationError: its frame is not the robot's, or its lens cannot be.
+    """
+    wanted = setup.frame
+    if not wanted:
+        called = [frame for frame in robot.optical_frames if setup.name.lower() in frame.lower()]
+        wanted = called[0] if len(called) == 1 else ""
+    frame = robot.camera_frame(wanted)
+    if setup.K and len(setup.K) != 4:
+        raise SimulationError(
+            f"camera '{setup.name}' has K = {list(setup.K)}", hint="K = [fx, fy, cx, cy], or leave it out for hfov_deg"
+        )
+    fx, fy, cx, cy = setup.K or _of_view(setup)
+    dx, dy = setup.centre_error_px
+    grown = 1 + setup.focal_error
+    try:
+        published = _camera(setup, frame, fx, fy, cx, cy)
+        true = _camera(setup, frame, fx * grown, fy * grown, cx + dx, cy + dy)
+    except CalibrationError as error:
+        raise SimulationError(error.message, where=error.where, hint=error.hint) from error
+    T = np.asarray(robot.frames[frame])
+    return Unit(setup.name, frame, true, published, T @ _off(setup), T, setup.photo, setup.glass)
+
+
+def _of_view(setup: CameraSetup) -> tuple[float, float, float, float]:
+    half = np.deg2rad(setup.hfov_deg) / 2
+    is_wide = setup.model in ("equidistant", "fisheye")
+    if not is_wide and setup.hfov_deg >= 170:
+        raise SimulationError(
+            f"camera '{setup.name}' cannot see {setup.hfov_deg:g} degrees by a {setup.model} lens",
+            hint='model = "equidistant"',
+        )
+    focal = setup.width / 2 / (half if is_wide else np.tan(half))
+    return float(focal), float(focal), (setup.width - 1) / 2, (setup.height - 1) / 2
+
+
+def _camera(setup: CameraSetup, frame: str, fx: float, fy: float, cx: float, cy: float) -> Camera:
+    K = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
+    zeros = {"equidistant": 4, "fisheye": 4, "rational_polynomial": 8, "rational": 8}.get(setup.model, 5)
+    D = np.array(setup.D or (0.0,) * zeros)
+    return Camera(setup.model, setup.width, setup.height, K, D, setup.name, frame)
+
+
+def _off(setup: CameraSetup) -> Float64Array:
+    from scipy.spatial.transform import Rotation
+
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_rotvec(setup.off_deg, degrees=True).as_matrix()
+    T[:3, 3] = np.array(setup.off_mm) / 1000
+    return T
+
+
+def _open_shutter(unit: Unit, at_ns: int) -> list[int]:
+    """The moments that are averaged: `at_ns` is the middle."""
+    if unit.photo.exposure_s == 0:
+        return [at_ns]
+    shares = (np.arange(unit.photo.exposures) + 0.5) / unit.photo.exposures - 0.5
+    return [at_ns + round(float(share) * unit.photo.exposure_s * 1e9) for share in shares]
+
+
+# -------------------------------------------------------------------------------------------- in a log
+
+
+@dataclass(frozen=True, eq=False)
+class CameraSensor:
+    """A camera: its picture as JPEG with camera_info, and if asked for /oracle/NAME/classes and /instances as PNG."""
+
+    play: Play
+    setup: CameraSetup
+    schedule: Schedule
+    unit: Unit = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "unit", unit_of(self.play.robot, self.setup))
+
+    def measure(self, at_ns: int, stamp_ns: int) -> Iterator[Message]:
+        shot = render(self.play, self.unit, at_ns, masks=self.setup.masks, pictures=self.setup.pictures)
+        frame, name = self.unit.frame, self.setup.name
+        if shot.image is not None:
+            jpeg = jpeg_from_pixels(shot.image, self.setup.photo.jpeg_quality)
+            yield Message(f"/camera/{name}/image/compressed", CameraImage(stamp_ns, frame, "jpeg", jpeg))
+        yield Message(f"/camera/{name}/camera_info", camera_info(self.unit.published, stamp_ns))
+        if self.setup.masks != "none":
+            for what, labels, nothing in (
+                ("classes", shot.classes, NO_CLASS),
+                ("instances", shot.instances, NO_INSTANCE),
+            ):
+                png = png_from_labels(labels, nothing)
+                yield Message(f"/oracle/{name}/{what}", CameraImage(stamp_ns, frame, "png", png))
+
+
+def png_from_labels(labels: Int64Array, nothing: int) -> bytes:
+    """(H, W) labels as a PNG of 8 or 16 bits, `nothing` where they are negative."""
+    import cv2
+
+    dtype = np.uint8 if nothing < 256 else np.uint16
+    _, data = cv2.imencode(".png", np.where(labels < 0, nothing, labels).astype(dtype))
+    return bytes(data)
+
+
+def camera_info(camera: Camera, stamp_ns: int) -> CameraInfo:
+    """The camera as a driver publishes it."""
+    P = np.hstack([camera.K, np.zeros((3, 1))])
+    return CameraInfo(
+        stamp_ns, camera.frame, camera.width, camera.height, camera.model, camera.D, camera.K, np.eye(3), P
+    )
