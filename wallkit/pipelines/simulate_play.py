@@ -11,7 +11,10 @@ import numpy as np
 
 from wallkit.core.geometry import interpolate_poses
 from wallkit.core.types import Float64Array, Int64Array
+from wallkit.errors import SimulationError, closest
 from wallkit.logs.message import Value
+from wallkit.pipelines.simulate_units import units_of
+from wallkit.simulate.camera import Unit
 from wallkit.simulate.crowd import People
 from wallkit.simulate.looks import Wardrobe
 from wallkit.simulate.robot import Robot
@@ -68,6 +71,26 @@ class Play:
     def place_studio(self, at_ns: int) -> None:
         """Puts people and doors where they are at a moment, for pictures."""
         self.studio.place(self.bodies_at(at_ns))
+
+    @cached_property
+    def units(self) -> dict[str, Unit]:
+        """The scenario's cameras by name.
+
+        Raises:
+            SimulationError: two have one name, a frame is not the robot's, or a lens cannot be.
+        """
+        return units_of(self.robot, self.scenario.cameras)
+
+    def unit(self, name: str) -> Unit:
+        """One of the scenario's cameras.
+
+        Raises:
+            SimulationError: there is none of that name; else as `units`.
+        """
+        if name not in self.units:
+            hint = closest(name, self.units) if self.units else "add a [[cameras]] table to the scenario"
+            raise SimulationError(f"the scenario has no camera '{name}'", hint=hint)
+        return self.units[name]
 
     def close(self) -> None:
         """Frees what pictures needed, if there were any."""

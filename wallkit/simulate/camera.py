@@ -1,7 +1,7 @@
 """A camera somewhere in a scene -> its picture, and what each pixel truly shows, for any lens.
 
-What a pixel shows comes by cast rays with the lens's own directions, which needs no OpenGL and is exact; or, faster, from the
-renderer, which may differ by a pixel at edges.
+What a pixel shows comes by cast rays with the lens's own directions, which needs no OpenGL and is exact; or, faster, from
+the renderer, which may differ by a pixel at edges.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def photograph(
     for k, T in enumerate(T_map_optical):
         place(k)
         sheet = np.concatenate([studio.picture(eye, _turned(T, R)) for eye, R in optics.eyes])
-        if optics.columns is not None:
+        if optics.columns is not None and optics.rows is not None:
             sheet = cv2.remap(sheet, optics.columns, optics.rows, cv2.INTER_CUBIC, borderMode=cv2.BORDER_CONSTANT)
         if len(T_map_optical) == 1:
             return developed(rng, unit.photo, sheet)
@@ -115,7 +115,7 @@ def solids_by_raster(studio: Studio, unit: Unit, T_map_optical: Float64Array) ->
     sheet = np.concatenate(
         [studio.solids(eye, _turned(T_map_optical, R), unseen=_unseen(unit.glass)) for eye, R in optics.eyes]
     )
-    if optics.columns is None:
+    if optics.columns is None or optics.rows is None:
         return sheet
     drawn = cv2.remap(
         (sheet + 1).astype(np.float32), optics.columns, optics.rows, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT

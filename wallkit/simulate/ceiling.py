@@ -46,7 +46,7 @@ def ceiling_picture(
 
 
 def lamps_of(rng: np.random.Generator, size_m: tuple[float, float]) -> Float64Array:
-    """(L, 4) x, y, width, height [m] of lamps from the lowest corner: in rows, but no two gaps the same; some are missing."""
+    """(L, 4) x, y, width, height [m] of lamps from the lowest corner: in uneven rows, some missing."""
     step = float(rng.uniform(2.2, 3.4))
     kind = rng.choice(3)
     w, h = ((1.2, 0.15), (0.6, 0.6), (0.22, 0.22))[kind]

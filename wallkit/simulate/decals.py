@@ -1,4 +1,4 @@
-"""A thing's name and the size of one of its faces -> a picture of that face: the bowl on a toilet's top, the handle of a door.
+"""A thing's name and the size of one of its faces -> a picture of that face: a toilet's bowl from above, a door with handle.
 
 A fixture stays the box that the map and the LiDAR know; what makes it a fixture is painted on. Every picture is for a face
 seen from outside, upright, and fills it.
@@ -21,7 +21,7 @@ _FACETS = 24
 class Canvas:
     """A face to paint on, in shares of its width and height from its upper left corner."""
 
-    def __init__(self, rng: np.random.Generator, size_m: tuple[float, float], base: Colour) -> None:
+    def __init__(self, rng: np.random.Generator, size_m: tuple[float, float], base: Any) -> None:
         self.size_m = size_m
         self.px = tuple(int(np.clip(round(side * _PX_PER_M), _LEAST_PX, _MOST_PX)) for side in size_m)
         shade = 1 + 0.006 * fractal(rng, (self.px[1], self.px[0]), slope=1.5)
@@ -195,7 +195,9 @@ def _poster(rng: np.random.Generator, size_m: tuple[float, float], base: Colour)
     canvas.box(0.08, 0.17, 0.92, 0.6, colour(rng, float(rng.random()), 0.5, 0.7))
     for _ in range(int(rng.integers(2, 6))):
         x, y = rng.uniform(0.2, 0.8), rng.uniform(0.25, 0.52)
-        canvas.ellipse(x, y, rng.uniform(0.04, 0.12), rng.uniform(0.03, 0.08), colour(rng, float(rng.random()), 0.6, 0.7))
+        canvas.ellipse(
+            x, y, rng.uniform(0.04, 0.12), rng.uniform(0.03, 0.08), colour(rng, float(rng.random()), 0.6, 0.7)
+        )
     for y in np.arange(0.65, 0.93, 0.035).tolist():
         canvas.box(0.08, y, float(rng.uniform(0.5, 0.92)), y + 0.014, (0.25, 0.25, 0.25))
     if rng.random() < 0.5:

@@ -1,7 +1,7 @@
 """Which OpenGL the machine has -> a MuJoCo renderer on it: EGL first, then OSMesa, tried in a process of their own.
 
-A library that is there but broken takes the whole process down, so the first attempt happens elsewhere. Everything but colour
-pictures works without any of this.
+A library that is there but broken takes the whole process down, so the first attempt happens elsewhere. Everything but
+colour pictures works without any of this.
 """
 
 from __future__ import annotations
@@ -19,7 +19,12 @@ from wallkit.errors import SimulationError
 BACKENDS = ("egl", "osmesa")
 APT_LINE = "apt-get install -y --no-install-recommends libegl1 libgl1"
 APT_LINE_OSMESA = "apt-get install -y --no-install-recommends libosmesa6"
-_PROBE = "import mujoco; c = mujoco.GLContext(16, 16); c.make_current(); mujoco.MjrContext(mujoco.MjModel.from_xml_string('<mujoco/>'), 100)"
+_PROBE = """
+import mujoco
+context = mujoco.GLContext(16, 16)
+context.make_current()
+mujoco.MjrContext(mujoco.MjModel.from_xml_string("<mujoco/>"), 100)
+"""
 _PROBE_S = 60.0
 
 
@@ -80,7 +85,12 @@ def _reason_against(name: str) -> str:
     environment.pop("PYOPENGL_PLATFORM", None)
     try:
         done = subprocess.run(
-            [sys.executable, "-c", _PROBE], env=environment, capture_output=True, text=True, timeout=_PROBE_S, check=False
+            [sys.executable, "-c", _PROBE],
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=_PROBE_S,
+            check=False,
         )
     except subprocess.TimeoutExpired:
         return f"no answer in {_PROBE_S:.0f} s"

@@ -28,7 +28,9 @@ class Looks:
     ceiling: Literal["unique", "repeating"] = setting(
         "unique", "unique: no two places look the same; repeating: panels every 1.2 m, the hard case"
     )
-    walls: str = setting("", "one surface for all walls: paint, plaster, tiles, brick, wainscot, concrete; else by room")
+    walls: str = setting(
+        "", "one surface for all walls: paint, plaster, tiles, brick, wainscot, concrete; else by room"
+    )
     posters: float = setting(0.12, "posters per metre of wall", low=0, high=1)
     lights: int = setting(0, "lamps that light a place, the nearest ones; 0: by chance 2 to 5", low=0, high=6)
     brightness: float = setting(1.0, "of all light", low=0.05, high=4)
@@ -203,11 +205,11 @@ _FACES: Mapping[str, Mapping[str, str]] = {
     "toilet": {"top": "toilet_top", "front": "toilet_front"},
     "urinal": {"front": "urinal_front"},
     "sink": {"top": "sink_top", "front": "sink_front"},
-    "door": {side: "door" for side in ("front", "back", "left", "right")},
+    "door": dict.fromkeys(("front", "back", "left", "right"), "door"),
     "dispenser": {"front": "dispenser"},
     "radiator": {"front": "radiator", "back": "radiator"},
-    "trash": {side: "bin" for side in ("front", "back", "left", "right")},
-    "furniture": {side: "drawers" for side in ("front", "back")},
+    "trash": dict.fromkeys(("front", "back", "left", "right"), "bin"),
+    "furniture": dict.fromkeys(("front", "back"), "drawers"),
 }
 _PLAIN: Mapping[str, str] = {
     "wall": "paint",

@@ -1,7 +1,7 @@
 """A lens model -> the pinholes that see what it sees, and where each of its pixels is found in them.
 
-MuJoCo renders pinholes. Without distortion one of them is the camera itself; a narrow lens is looked up in one that is larger
-than it; a wide one, or one beyond 180 degrees, in up to six sides of a cube.
+MuJoCo renders pinholes. Without distortion one of them is the camera itself; a narrow lens is looked up in one that is
+larger than it; a wide one, or one beyond 180 degrees, in up to six sides of a cube.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def optics_of(camera: Camera) -> Optics:
     """The route for a camera: itself, one larger pinhole, or the sides of a cube that it looks through."""
     v, u = np.mgrid[: camera.height, : camera.width].astype(np.float64)
     rays = camera.unproject(np.stack([u, v], axis=-1))
-    sees = np.isfinite(rays).all(axis=-1)
+    sees = np.asarray(np.isfinite(rays).all(axis=-1))
     fx, fy, cx, cy = camera.K[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
     if camera.model != "equidistant" and not camera.D.any():
         eye = Pinhole(camera.width, camera.height, fx, fy, cx, cy)

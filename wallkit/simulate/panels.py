@@ -1,7 +1,7 @@
 """Solids -> flat panels with metric texture coordinates, cut where a wall passes from one room to the next.
 
-MuJoCo projects a 2-D texture through a box along one axis, which leaves streaks on the others; a box therefore becomes a mesh
-of its faces, each with coordinates of its own.
+MuJoCo projects a 2-D texture through a box along one axis, which leaves streaks on the others; a box therefore becomes a
+mesh of its faces, each with coordinates of its own.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from wallkit.core.types import Float64Array, Int64Array
-from wallkit.simulate.world import MAP, Room, Solid, World
+from wallkit.simulate.world import MAP, Room, World
 
 SIDES = ("front", "back", "left", "right", "top", "bottom")
 # x forward, y left, z up in the solid's own frame, as the fixtures of a map stand before their wall
@@ -28,7 +28,7 @@ class Panel:
 
     Attributes:
         solid: its number in the world. side: of SIDES, in the solid's own frame.
-        corners: (4, 3) in the frame of the solid's body, seen from outside: lower left, lower right, upper right, upper left.
+        corners: (4, 3) in the frame of the solid's body, anticlockwise from the lower left one as seen from outside.
         size_m: (width, height). room: the room it looks into, "" for none or where rooms do not matter.
         start_m: (u, v) place of its lower left corner on the surface it belongs to [m].
     """
@@ -43,7 +43,7 @@ class Panel:
     def grid(self, texture_m: tuple[float, float] | None) -> tuple[Float64Array, Int64Array, Float64Array]:
         """Vertices (V, 3), triangles (M, 3) and texture coordinates (V, 2), (0, 0) the picture's upper left corner.
 
-        Light is computed at vertices, so large panels are divided. Without a texture's size the picture fills the panel once.
+        Light is computed at vertices, so large panels are divided. Without a texture's size it fills the panel once.
         """
         low, high = np.zeros(2), np.ones(2)
         if texture_m is not None:
@@ -71,8 +71,8 @@ class Panel:
 def panels_of(world: World, number: int) -> list[Panel]:
     """The six faces of a box; those of a wall that stands fast cut at the rooms' borders.
 
-    Surfaces of what stands fast are continuous in the map: tiles run on from one piece of a wall to the next, and begin at the
-    floor. What moves carries its own surface along.
+    Surfaces of what stands fast are continuous in the map: tiles run on from one piece of a wall to the next, and begin at
+    the floor. What moves carries its own surface along.
     """
     solid = world.solids[number]
     x, y, z = solid.size

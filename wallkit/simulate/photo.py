@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,7 @@ _BRIGHT = 0.46
 class Photo:
     """A camera's electronics and optics; with the first five at zero or one it shows exactly what the renderer gives."""
 
-    auto_exposure: float = setting(0.7, "how far it goes to a middle brightness by itself: 0 not at all, 1 always", low=0, high=1)
+    auto_exposure: float = setting(0.7, "how far it goes to a middle brightness by itself", low=0, high=1)
     exposure: float = setting(1.0, "times the light", low=0.05, high=20)
     vignette: float = setting(0.15, "share of light lost in the corners", low=0, high=1)
     read_noise: float = setting(0.004, "noise in the dark, of full scale", low=0, high=0.5)
@@ -28,7 +29,7 @@ class Photo:
     defocus_px: float = setting(0.0, "sigma of a lens out of focus", low=0, high=20)
     exposure_s: float = setting(0.0, "the shutter stays open so long, and what moves is blurred", low=0, high=1)
     exposures: int = setting(4, "pictures that are averaged while the shutter is open", low=2, high=64)
-    variety: float = setting(0.0, "how far exposure, warmth, gamma and defocus differ by chance between pictures", low=0, high=1)
+    variety: float = setting(0.0, "how far all of this differs by chance between pictures", low=0, high=1)
     jpeg_quality: int = setting(90, "of the recorded JPEG", low=1, high=100)
 
 
@@ -40,10 +41,12 @@ def developed(rng: np.random.Generator, photo: Photo, image: UInt8Array) -> UInt
     import cv2
 
     photo = _varied(rng, photo)
-    if photo == replace(PERFECT, jpeg_quality=photo.jpeg_quality, exposures=photo.exposures, exposure_s=photo.exposure_s):
+    if photo == replace(
+        PERFECT, jpeg_quality=photo.jpeg_quality, exposures=photo.exposures, exposure_s=photo.exposure_s
+    ):
         return image
-    light = _DECODE.astype(np.float32)[image]
-    light *= np.float32(_gain(photo, light)) * _balance(photo.warmth)
+    light: Any = _DECODE.astype(np.float32)[image]
+    light = light * np.float32(_gain(photo, light)) * _balance(photo.warmth)
     if photo.vignette > 0:
         light *= _vignette(photo.vignette, image.shape[:2])[..., None]
     if photo.defocus_px > 0:

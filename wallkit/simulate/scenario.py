@@ -55,7 +55,9 @@ class CameraSetup:
     masks: Literal["none", "raster", "exact"] = setting(
         "none", "what each pixel shows, on /oracle/NAME/...: by the renderer, or exactly by rays (and without OpenGL)"
     )
-    glass: Literal["surface", "through"] = setting("surface", "a pixel on a pane is labelled as glass, or as what is behind")
+    glass: Literal["surface", "through"] = setting(
+        "surface", "a pixel on a pane is labelled as glass, or as what is behind"
+    )
     pictures: bool = setting(True, "false: masks only, which needs no OpenGL")
     off_mm: tuple[float, float, float] = setting(
         (0.0, 0.0, 0.0), "it truly is so far from where the URDF says, along its own axes: right, down, forward"

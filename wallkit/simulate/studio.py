@@ -135,7 +135,7 @@ def _spec(wardrobe: Wardrobe, pieces: tuple[Piece | Primitive, ...], lights: int
     spec.visual.headlight.specular = [0.0] * 3
     spec.visual.quality.offsamples = samples
     spec.visual.quality.shadowsize = 2048
-    spec.visual.quality.numslices, spec.visual.quality.numstacks = 48, 24
+    spec.visual.quality.numslices, spec.visual.quality.numstacks = 32, 16
     spec.stat.extent = 10.0
     for _ in range(lights):
         spec.worldbody.add_light(

@@ -33,7 +33,9 @@ def colour(rng: np.random.Generator, hue: float, saturation: float, value: float
     return colorsys.hsv_to_rgb(h % 1.0, float(np.clip(s, 0, 1)), float(np.clip(v, 0.05, 1)))
 
 
-def fractal(rng: np.random.Generator, shape: tuple[int, int], *, slope: float = 1.5, least: float = 1.0) -> Float64Array:
+def fractal(
+    rng: np.random.Generator, shape: tuple[int, int], *, slope: float = 1.5, least: float = 1.0
+) -> Float64Array:
     """(h, w) noise of mean 0 and deviation 1 whose power falls with frequency; its edges meet.
 
     Args:
@@ -51,7 +53,7 @@ def fractal(rng: np.random.Generator, shape: tuple[int, int], *, slope: float = 
 
 def _flat(shade: Float64Array, base: Colour) -> UInt8Array:
     """A colour times a shade (h, w) around 1."""
-    return np.clip(shade[..., None] * np.array(base) * 255, 0, 255).astype(np.uint8)
+    return np.asarray(np.clip(shade[..., None] * np.array(base) * 255, 0, 255).astype(np.uint8))
 
 
 def _paint(rng: np.random.Generator, base: Colour) -> Texture:
@@ -135,9 +137,7 @@ def _floor_tiles(rng: np.random.Generator, base: Colour) -> Texture:
 
 
 def _brick(rng: np.random.Generator, base: Colour) -> Texture:
-    return _grid(
-        rng, base, tile_m=(0.25, 0.075), count=(6, 20), grout_m=0.011, px_per_m=340, jitter=0.09, shift=0.5
-    )
+    return _grid(rng, base, tile_m=(0.25, 0.075), count=(6, 20), grout_m=0.011, px_per_m=340, jitter=0.09, shift=0.5)
 
 
 def _planks(rng: np.random.Generator, base: Colour) -> Texture:
