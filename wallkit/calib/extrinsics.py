@@ -20,6 +20,8 @@ from wallkit.errors import CalibrationError
 FEWEST = 3
 OUTLIER_RATIO, OUTLIER_Z = 3.0, 5.0
 MOST_REJECTED = 0.25
+# a guess farther from the answer than this is a mistake, not a tolerance
+FAR_DEG, FAR_M = 15.0, 0.3
 _ROUGH_ROUNDS = 4
 
 
@@ -175,13 +177,12 @@ def _best_start(problem: Problem, guess: Float64Array | None, seed: int) -> tupl
     if guess is not None:
         near = fit(problem, guess, rounds=_ROUGH_ROUNDS)
         best = min([near, *fits], key=lambda f: f.cost)
-        if near.cost > 2 * best.cost + len(problem):
-            degrees = np.degrees(angle_between(best.T, guess))
-            warnings.append(
-                f"a place {degrees:.0f} deg from the guess fits better; is the guess the transform lidar -> camera?"
-            )
-        else:
+        if near.cost <= 2 * best.cost + len(problem):
             best = near
+        degrees, metres = np.degrees(angle_between(best.T, guess)), np.linalg.norm(best.T[:3, 3] - guess[:3, 3])
+        if degrees > FAR_DEG or metres > FAR_M:
+            said = f"the boards put the LiDAR {degrees:.0f} deg and {metres:.2f} m from the guess"
+            warnings.append(f"{said}: is the guess the transform lidar -> camera, and are the frames right?")
         return best, warnings
     if not fits:
         hint = "check that the LiDAR points are on the board, and that pictures and scans belong together"

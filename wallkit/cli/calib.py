@@ -6,7 +6,9 @@ import click
 
 from wallkit.cli.calib_board import board
 from wallkit.cli.calib_convert import convert
+from wallkit.cli.calib_extrinsics import extrinsics
 from wallkit.cli.calib_intrinsics import intrinsics
+from wallkit.cli.calib_urdf import from_urdf, to_urdf
 
 
 @click.group()
@@ -14,5 +16,5 @@ def calib() -> None:
     """Calibrate cameras and the place of a LiDAR to them, and say how far the result may be trusted."""
 
 
-for command in (board, intrinsics, convert):
+for command in (board, intrinsics, extrinsics, from_urdf, to_urdf, convert):
     calib.add_command(command)

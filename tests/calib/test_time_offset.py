@@ -1,0 +1,76 @@
+"""A board waved before both sensors, with clocks that differ by a known amount."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wallkit.calib.time_offset import BoardTrack, TimedTrace, poses_at, time_offset
+from wallkit.calib.worlds import UPRIGHT, World, board_at, hits
+
+T = np.eye(4)
+T[:3, :3], T[:3, 3] = UPRIGHT, (0.03, 0.08, -0.06)
+IMAGE_NS, SCAN_NS = 50_000_000, 100_000_000
+
+
+def waved(seconds, *, amplitude=0.3):
+    """The board at a time [s]: it swings towards the sensors and away, turning as it goes."""
+    return board_at(
+        0.1 * np.sin(0.7 * seconds),
+        0.05,
+        1.6 + amplitude * np.sin(2.1 * seconds),
+        pitch_deg=20 * np.sin(1.3 * seconds) * amplitude / 0.3,
+        yaw_deg=25 * np.sin(0.9 * seconds) * amplitude / 0.3,
+    )
+
+
+def recorded(tau_s, *, amplitude=0.3, seed=0, seconds=12.0):
+    """Images and scans of it; the camera's clock shows tau more than the LiDAR's."""
+    rng = np.random.default_rng(seed)
+    true_ns = np.arange(0, int(seconds * 1e9), IMAGE_NS)
+    track = BoardTrack(true_ns + round(tau_s * 1e9), np.array([waved(t / 1e9, amplitude=amplitude) for t in true_ns]))
+    world = World(beam_deg=1.0)
+    traces = []
+    for begin in range(200_000_000, int(seconds * 1e9) - 300_000_000, SCAN_NS):
+        points = hits(world, T, waved(begin / 1e9, amplitude=amplitude), rng)
+        traces.append(TimedTrace(points, np.full(len(points), begin, dtype=np.int64)))
+    return track, traces
+
+
+@pytest.mark.parametrize("tau_ms", [-60.0, 0.0, 35.0])
+def test_offset_within_its_own_interval(tau_ms):
+    track, traces = recorded(tau_ms / 1e3)
+    found = time_offset(track, traces, T, sigma_range_m=0.01)
+    assert found.verdict == "known"
+    assert found.sigma_s < 0.003
+    assert abs(found.tau_s * 1e3 - tau_ms) < 3.5 * found.sigma_s * 1e3 + 0.3
+    assert f"{found.tau_s * 1e3:+.1f}" in found.words
+
+
+def test_sigma_is_the_scatter_between_captures():
+    errors, sigmas = [], []
+    for seed in range(24):
+        track, traces = recorded(0.02, seed=seed, seconds=6.0)
+        found = time_offset(track, traces, T, sigma_range_m=0.01)
+        errors.append(found.tau_s - 0.02)
+        sigmas.append(found.sigma_s)
+    assert np.std(errors) == pytest.approx(np.mean(sigmas), rel=0.5)
+
+
+def test_a_still_board_says_nothing():
+    track, traces = recorded(0.02, amplitude=0.001)
+    found = time_offset(track, traces, T, sigma_range_m=0.01)
+    assert found.verdict == "cannot tell"
+    assert np.isinf(found.sigma_s)
+    assert "move it" in found.words
+
+
+def test_poses_between_images():
+    track, _ = recorded(0.0)
+    between = np.array([525_000_000], dtype=np.int64)
+    poses, velocity = poses_at(track, between)
+    np.testing.assert_allclose(poses[0], waved(0.525), atol=4e-4)
+    speed = (waved(0.526)[:3, 3] - waved(0.524)[:3, 3]) / 0.002
+    np.testing.assert_allclose(velocity[0, 3:], speed, atol=5e-3)
+    gappy = BoardTrack(track.stamps_ns[::5], track.poses[::5])
+    assert np.isnan(poses_at(gappy, between)[0]).all()
