@@ -12,6 +12,7 @@ from wallkit.cli.calib_board import board_option
 from wallkit.cli.calib_urdf import matrix_lines
 
 if TYPE_CHECKING:
+    from wallkit.calib.time_offset import TimeOffset
     from wallkit.pipelines.calibrate_extrinsics import ExtrinsicsRun
 
 _REFERENCE_M = 3.0
@@ -83,6 +84,7 @@ def extrinsics(
       wallkit calib extrinsics corners.npz --scans clouds/ --camera cam.yaml --board board.toml
     """
     from wallkit.calib.boards import board_from
+    from wallkit.pipelines.calibrate_clock import with_clock
     from wallkit.pipelines.calibrate_extrinsics import run_extrinsics
     from wallkit.pipelines.calibrate_request import gather, options_from_words, provenance
     from wallkit.pipelines.outputs import check_file_out, write_whole
@@ -103,7 +105,7 @@ def extrinsics(
     topics = (given["scan_topic"], given["image_topic"])
     with common.progress("looking for the board", None, quiet=quiet) as done:
         gathered = gather(inputs, given["scans"], board, given["camera_file"], topics=topics, done=done)
-    run = run_extrinsics(gathered, options)
+    run, clock = with_clock(run_extrinsics(gathered, options))
     warnings = [*notes, *gathered.notes, *run.result.warnings, *([run.scale.words] if run.scale.is_suspect else [])]
     warnings += [run.bias.words] if run.bias is not None and run.bias.is_suspect else []
     made = run.calibration(provenance(gathered, notes=tuple(warnings)))
@@ -113,9 +115,9 @@ def extrinsics(
 
         write_whole(out, toml_from_calibration(made).encode())
     if as_json:
-        common.emit({**_document(run), "warnings": warnings, "out": out if is_written else None})
+        common.emit({**_document(run, clock), "warnings": warnings, "out": out if is_written else None})
     else:
-        click.echo("\n".join(_page(run)))
+        click.echo("\n".join(_page(run, clock)))
         for warning in warnings:
             common.warn(warning, quiet=quiet)
         if out is not None:
@@ -127,7 +129,7 @@ def extrinsics(
 # ------------------------------------------------------------------------------------------------ details
 
 
-def _page(run: ExtrinsicsRun) -> list[str]:
+def _page(run: ExtrinsicsRun, clock: TimeOffset | None) -> list[str]:
     """What a user reads, the answer and what to do next at the end."""
     from wallkit.calib.extrinsics import sigma_words
 
@@ -141,6 +143,8 @@ def _page(run: ExtrinsicsRun) -> list[str]:
     lines.append(f"squares   {run.scale.words}")
     if run.bias is not None:
         lines.append(f"ranges    {run.bias.words}, fitted beside the transform")
+    if clock is not None:
+        lines.append(f"clocks    {clock.words}")
     lines.append("")
     lines += matrix_lines(result.T) if result.covariance is not None else _partial(run)
     lines.append("")
@@ -187,7 +191,8 @@ def _ending(run: ExtrinsicsRun) -> list[str]:
     return lines
 
 
-def _document(run: ExtrinsicsRun) -> dict[str, Any]:
+def _document(run: ExtrinsicsRun, clock: TimeOffset | None) -> dict[str, Any]:
+    from dataclasses import asdict
 
     import numpy as np
 
@@ -217,12 +222,10 @@ def _document(run: ExtrinsicsRun) -> dict[str, Any]:
         "square_scale_is_suspect": run.scale.is_suspect,
         "range_bias_mm": None if run.bias is None else 1e3 * run.bias.value,
         "pixel_error_95": None if run.pixel_error is None else [{"range_m": r, "px": e} for r, e in run.pixel_error],
-        "views": [
-            {"name": v.name, "points": v.points, "mean_mm": v.mean_mm, "rms_mm": v.rms_mm, "weight": v.weight}
-            for v in result.views
-        ],
+        "views": [asdict(view) for view in result.views],
         "left_out": [{"name": i.name, "why": i.why} for i in run.left_out]
         + [{"name": v.name, "why": v.why} for v in result.views if v.why],
+        "time_offset": None if clock is None else asdict(clock),
         "next": None if run.advice is None else run.advice.words,
     }
     if result.kind == "planar":

@@ -51,13 +51,23 @@ class LeftOut:
     why: str
 
 
+@dataclass(frozen=True)
+class LogSource:
+    """A log that was gathered from: its files, topics, and the stretches (begin, end) [ns] in which the board moved."""
+
+    paths: tuple[Path, ...]
+    scans: str
+    images: str
+    moving: tuple[tuple[int, int], ...]
+
+
 @dataclass(frozen=True, eq=False)
 class Gathered:
     """What the inputs hold.
 
     Attributes:
         camera, camera_covariance: intrinsics. looked_at: how many pictures or moments there were.
-        files: that were read, for the provenance.
+        files: that were read, for the provenance. log: where they are a log.
     """
 
     camera: Camera
@@ -71,6 +81,7 @@ class Gathered:
     time_offset_ns: int = 0
     time_offset_sigma_ns: float | None = None
     notes: tuple[str, ...] = ()
+    log: LogSource | None = None
 
 
 @dataclass(frozen=True)
@@ -191,7 +202,7 @@ def run_extrinsics(gathered: Gathered, options: SolveOptions) -> ExtrinsicsRun:
 
 
 def _planar_sightings(gathered: Gathered, options: SolveOptions) -> tuple[list[Sighting], list[LeftOut]]:
-    plate, known = _outline(gathered.board)
+    plate, known = outline_of(gathered.board)
     returns = [pair.returns for pair in gathered.pairs if pair.returns is not None]
     poses = [pair.pose for pair in gathered.pairs]
     sigma = options.sigma_range_m
@@ -216,7 +227,7 @@ def _planar_sightings(gathered: Gathered, options: SolveOptions) -> tuple[list[S
 
 
 def _cloud_sightings(gathered: Gathered, options: SolveOptions) -> tuple[list[Sighting], list[LeftOut]]:
-    plate, _ = _outline(gathered.board)
+    plate, _ = outline_of(gathered.board)
     size = np.ptp(plate[:, :2], axis=0)
     found, missed = [], []
     for pair in gathered.pairs:
@@ -241,7 +252,7 @@ def _cloud_sightings(gathered: Gathered, options: SolveOptions) -> tuple[list[Si
 def _with_sides(
     sightings: Sequence[Sighting], gathered: Gathered, T: Float64Array, options: SolveOptions
 ) -> list[Sighting]:
-    plate, known = _outline(gathered.board)
+    plate, known = outline_of(gathered.board)
     if not known:
         return list(sightings)
     size = np.ptp(plate[:, :2], axis=0)
@@ -255,7 +266,7 @@ def _with_sides(
     return out
 
 
-def _outline(board: Board) -> tuple[Float64Array, bool]:
+def outline_of(board: Board) -> tuple[Float64Array, bool]:
     """(4, 3) corners of the plate in the board frame, and whether they were declared; else those of the pattern."""
     if board.plate_m is not None:
         return board.plate_corners, True
@@ -267,7 +278,7 @@ def _outline(board: Board) -> tuple[Float64Array, bool]:
 def _advice(
     gathered: Gathered, options: SolveOptions, sightings: Sequence[Sighting], result: Extrinsics, *, is_planar: bool
 ) -> Advice | None:
-    size = np.ptp(_outline(gathered.board)[0][:, :2], axis=0)
+    size = np.ptp(outline_of(gathered.board)[0][:, :2], axis=0)
     pattern = np.ptp(gathered.board.object_points[:, :2], axis=0)
     columns, rows = gathered.board.grid
     world = World(

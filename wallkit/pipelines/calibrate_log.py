@@ -35,12 +35,11 @@ _FEWEST_STILL = 5
 
 @dataclass(frozen=True, eq=False)
 class _Moment:
-    """A board in an image of the log: its pose, and how fast it moves [m/s]."""
+    """A board in an image of the log: its pose, and the corners of its plate (4, 3) in the camera frame."""
 
     stamp_ns: int
     pose: BoardPose
     corners: Float64Array
-    speed: float = np.inf
 
 
 def gather_log(
@@ -71,7 +70,8 @@ def gather_log(
         raise CalibrationError(
             f"the board {board.words} is in none of {looked_at} images of {images.topic}", where=log.name, hint=hint
         )
-    kept, notes = _still(moments)
+    speeds = _speeds(moments)
+    kept, notes = _still(moments, speeds)
     nearest, frame = _nearest_scans(log, scans.topic, [m.stamp_ns for m in kept])
     pairs = []
     for moment in kept:
@@ -109,7 +109,7 @@ def _moments(
             raise CalibrationError(
                 f"images of {topic} have {sizes}", where=log.name, hint="give --camera of this camera and mode"
             )
-        if find_roughly(grey, board) is None:
+        if find_roughly(grey, board, width=640) is None:
             continue
         corners = find_corners(grey, board)
         if corners is None:
@@ -133,8 +133,8 @@ def grey_of(image: CameraImage) -> UInt8Array:
     return pixels if pixels.ndim == 2 else np.asarray(cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
 
 
-def _still(moments: list[_Moment]) -> tuple[list[_Moment], list[str]]:
-    """One moment of every time the board was held still; all of them when it never was, with a warning."""
+def _speeds(moments: list[_Moment]) -> list[float]:
+    """How fast the board's corners move [m/s] at each moment; inf where no other moment is near."""
     speeds = [np.inf] * len(moments)
     for i in range(len(moments) - 1):
         first, second = moments[i], moments[i + 1]
@@ -142,6 +142,25 @@ def _still(moments: list[_Moment]) -> tuple[list[_Moment], list[str]]:
         if 0 < seconds < 2.5 * PERIOD_S:
             speed = float(np.linalg.norm(second.corners - first.corners, axis=1).mean()) / seconds
             speeds[i], speeds[i + 1] = min(speeds[i], speed), min(speeds[i + 1], speed)
+    return speeds
+
+
+def _moving(moments: list[_Moment], speeds: list[float]) -> tuple[tuple[int, int], ...]:
+    """Stretches (begin, end) [ns] in which the board is seen and moves."""
+    stretches: list[list[int]] = []
+    for first, second, speed in zip(moments, moments[1:], speeds[1:], strict=False):
+        gap_ns = second.stamp_ns - first.stamp_ns
+        if gap_ns > 2.5e9 * PERIOD_S or not STILL_M_PER_S < speed < np.inf:
+            continue
+        if stretches and stretches[-1][1] == first.stamp_ns:
+            stretches[-1][1] = second.stamp_ns
+        else:
+            stretches.append([first.stamp_ns, second.stamp_ns])
+    return tuple((begin, end) for begin, end in stretches)
+
+
+def _still(moments: list[_Moment], speeds: list[float]) -> tuple[list[_Moment], list[str]]:
+    """One moment of every time the board was held still; all of them when it never was, with a warning."""
     groups: list[list[_Moment]] = []
     for moment, speed in zip(moments, speeds, strict=True):
         if speed > STILL_M_PER_S:

@@ -1,0 +1,99 @@
+"""The moments of a log when the board moved -> the offset between the camera's clock and the LiDAR's."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from wallkit.calib.board_pose import AMBIGUOUS, pose_of_board
+from wallkit.calib.detect import find_corners
+from wallkit.calib.scan_board import find_trace, returns_of
+from wallkit.calib.sightings import BoardPose
+from wallkit.calib.time_offset import BoardTrack, TimedTrace, TimeOffset, time_offset
+from wallkit.core.types import CameraImage, Int64Array, Scan
+from wallkit.logs.reader import Log, open_log
+from wallkit.pipelines.calibrate_extrinsics import ExtrinsicsRun, Gathered, outline_of
+from wallkit.pipelines.calibrate_log import grey_of
+
+# so many seconds of motion say as much as is needed, and cost some seconds
+SECONDS = 20.0
+_NEAR_NS = 150_000_000
+
+
+def with_clock(run: ExtrinsicsRun) -> tuple[ExtrinsicsRun, TimeOffset | None]:
+    """The run with the time offset of its log where it can be told; None of files, and of clouds (no beam times)."""
+    source = run.gathered.log
+    if source is None or not run.is_planar or run.result.kind == "refused":
+        return run, None
+    windows = _chosen(source.moving)
+    if not windows:
+        said = "the board never moves before both sensors: the offset of their clocks cannot be told"
+        return run, TimeOffset(0.0, np.inf, 0.0, 0.0, "cannot tell", said)
+    log = open_log(list(source.paths))
+    track = _track(log, source.images, run.gathered, windows)
+    if track is None:
+        return run, TimeOffset(0.0, np.inf, 0.0, 0.0, "cannot tell", "the board is blurred whenever it moves")
+    found = time_offset(
+        track, _traces(log, source.scans, run, track), run.result.T, sigma_range_m=run.options.sigma_range_m
+    )
+    if found.verdict != "known":
+        return run, found
+    gathered = replace(
+        run.gathered, time_offset_ns=round(found.tau_s * 1e9), time_offset_sigma_ns=round(found.sigma_s * 1e9, 1)
+    )
+    return replace(run, gathered=gathered), found
+
+
+# ------------------------------------------------------------------------------------------------ details
+
+
+def _chosen(moving: tuple[tuple[int, int], ...]) -> list[tuple[int, int]]:
+    """The longest stretches of motion, in order, up to the seconds that are enough."""
+    chosen: list[tuple[int, int]] = []
+    seconds = 0.0
+    for begin, end in sorted(moving, key=lambda window: window[0] - window[1]):
+        if seconds < SECONDS:
+            chosen.append((begin, min(end, begin + int((SECONDS - seconds) * 1e9))))
+            seconds += (chosen[-1][1] - begin) / 1e9
+    return sorted(chosen)
+
+
+def _track(log: Log, topic: str, gathered: Gathered, windows: list[tuple[int, int]]) -> BoardTrack | None:
+    stamps, poses = [], []
+    for message in log.messages([topic], windows[0][0], windows[-1][1]):
+        image = message.value
+        if not isinstance(image, CameraImage) or not any(b <= message.stamp_ns <= e for b, e in windows):
+            continue
+        corners = find_corners(grey_of(image), gathered.board)
+        if corners is None:
+            continue
+        pose = pose_of_board(gathered.camera, gathered.board.object_points[corners.ids], corners.pixels)
+        if pose.ambiguity >= AMBIGUOUS:
+            stamps.append(message.stamp_ns)
+            poses.append(pose.T_camera_board)
+    if len(stamps) < 8:
+        return None
+    order = np.argsort(stamps, kind="stable")
+    return BoardTrack(np.array(stamps, dtype=np.int64)[order], np.array(poses)[order])
+
+
+def _traces(log: Log, topic: str, run: ExtrinsicsRun, track: BoardTrack) -> list[TimedTrace]:
+    plate, known = outline_of(run.gathered.board)
+    traces = []
+    begin, end = int(track.stamps_ns[0]) - _NEAR_NS, int(track.stamps_ns[-1]) + _NEAR_NS
+    for message in log.messages([topic], begin, end):
+        scan = message.value
+        if not isinstance(scan, Scan):
+            continue
+        nearest = int(np.abs(track.stamps_ns - scan.stamp_ns).argmin())
+        if abs(int(track.stamps_ns[nearest]) - scan.stamp_ns) > _NEAR_NS:
+            continue
+        board = BoardPose(track.poses[nearest], np.eye(6))
+        trace = find_trace(
+            returns_of(scan), board, plate, run.result.T, sigma_range_m=run.options.sigma_range_m, plate_is_known=known
+        )
+        if not trace.why and trace.offsets_s is not None:
+            times: Int64Array = scan.stamp_ns + np.round(trace.offsets_s * 1e9).astype(np.int64)
+            traces.append(TimedTrace(trace.points_m, times))
+    return traces
