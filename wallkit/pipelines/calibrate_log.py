@@ -24,7 +24,7 @@ from wallkit.errors import CalibrationError
 from wallkit.logs.images import pixels_from_image
 from wallkit.logs.reader import Log, open_log
 from wallkit.logs.topics import pick_image, pick_scan
-from wallkit.pipelines.calibrate_extrinsics import Gathered, LeftOut, Pair
+from wallkit.pipelines.calibrate_extrinsics import Gathered, LeftOut, LogSource, Pair
 
 PERIOD_S = 0.5
 STILL_M_PER_S = 0.02
@@ -84,7 +84,16 @@ def gather_log(
     covariance = stored.camera_covariance if stored else None
     files = (*inputs, *([camera_file] if camera_file else []))
     return Gathered(
-        camera, covariance, board, tuple(pairs), looked_at, tuple(left_out), files, frame, notes=tuple(notes)
+        camera=camera,
+        camera_covariance=covariance,
+        board=board,
+        pairs=tuple(pairs),
+        looked_at=looked_at,
+        left_out=tuple(left_out),
+        files=files,
+        lidar_frame=frame,
+        notes=tuple(notes),
+        log=LogSource(tuple(inputs), scans.topic, images.topic, _moving(moments, speeds)),
     )
 
 
