@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+# they cast scans, which takes time, and a bare room looks alike turned round: test_score judges them
+LOCALISABILITY = ("L003", "L004", "L006", "L008", "L009", "L014")
 HEAD = '<robot name="t" xmlns:wk="urn:wallkit:map:1">'
 
 

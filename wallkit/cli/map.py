@@ -18,6 +18,7 @@ from wallkit.cli.map_export import export
 from wallkit.cli.map_frame import adopt, origin, scale
 from wallkit.cli.map_look import import_, info, ls
 from wallkit.cli.map_measure import measure, tree
+from wallkit.cli.map_score import probe, score_command
 from wallkit.cli.map_slice import compat, slice_
 from wallkit.cli.map_walls import cut, fill, join, snap, split
 
@@ -272,7 +273,7 @@ for command in (
     *(new, add, array, move, rotate, rename, reparent, remove, set_),
     *(cut, fill, split, join, snap),
     *(adopt, scale, origin),
-    *(info, ls, tree, show, measure, slice_, audit, compat),
+    *(info, ls, tree, show, measure, slice_, audit, compat, score_command, probe),
     *(fmt, diff, merge, import_, export),
 ):
     map_group.add_command(command)

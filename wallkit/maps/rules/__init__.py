@@ -16,11 +16,13 @@ from wallkit.maps.labels import Labels
 from wallkit.maps.rules import (
     audit,
     cells,
+    cues,
     doors,
     fills,
     graph,
     joints,
     junctions,
+    localisation,
     openings,
     placement,
     portability,
@@ -57,6 +59,7 @@ _GROUPS = (
     *(slices.RULES, cells.RULES),
     *(portability.RULES, references.RULES, rasters.RULES),
     *(audit.RULES,),
+    *(localisation.RULES, cues.RULES),
 )
 
 RULES: dict[str, Rule] = {rule.code: rule for group in _GROUPS for rule in sorted(group, key=lambda rule: rule.code)}

@@ -57,8 +57,11 @@ class Tolerances:
     wobble_m: float = setting(0.05, "how far the scan plane may wander as the robot tilts (WK-L013)", low=0)
     ambiguous_warn: float = setting(0.1, "share of ambiguous poses that is a warning (WK-L003)", low=0, high=1)
     ambiguous_error: float = setting(0.5, "share of ambiguous poses that is an error (WK-L003)", low=0, high=1)
+    degenerate_warn: float = setting(0.1, "share of poses with an open direction that is told (WK-L004)", low=0, high=1)
     glass_share: float = setting(0.3, "share of glass and mirror in the visible boundary (WK-L006)", low=0, high=1)
     movable_share: float = setting(0.2, "share of movable things in the visible boundary (WK-L009)", low=0, high=1)
+    cue_share: float = setting(0.1, "share of poses that must see a class but wall (WK-L014)", low=0, high=1)
+    beams: int = setting(72, "beams of a scan that poses are compared by (WK-L003)", low=8, high=240)
     cell_m: float = setting(0.05, "cell size of rasters made from the map (WK-L005, L011, L012)", low=1e-3)
     # P
     geometries: int = setting(1000, "more make other tools slow (WK-P008)", low=1)
