@@ -80,7 +80,7 @@ def test_show_says_what_it_cannot_do(run_here, tmp_path):
         (("torn.urdf",), "WK-X001"),
         (("torn.urdf", "--findings"), "WK-X001"),
         (("room.urdf", "-o", "plan.pdf"), "end it in .svg or .png"),
-        (("room.urdf", "--z", "high"), "'high' is no height"),
+        (("room.urdf", "--z", "high"), "'high' is no length: metres, or 900mm"),
         (("room.urdf", "-o", "no/such/plan.svg"), "cannot be written"),
     ):
         done = run_here("show", *words)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 
+import numpy as np
 import pytest
 
 from tests.e2e.conftest import Done
@@ -11,6 +12,7 @@ from tests.maps.floor import CUT, FLOOR, JUDGED, SPLIT
 from wallkit.cli.app import main
 from wallkit.maps.document import wk
 from wallkit.maps.edit.verbs import VERBS
+from wallkit.maps.read import load_map
 from wallkit.maps.rules import RULES, validate
 from wallkit.maps.rules.base import Problem, Rule
 
@@ -174,6 +176,7 @@ def test_an_empty_template_says_that_it_is_ambiguous_on_purpose(run_here, tmp_pa
         (("move", "t.urdf", "sink_1", "--by", "1,x"), "'x' is no length: metres, or 900mm"),
         (("move", "t.urdf", "sink_1", "--by", "1,nan"), "'nan' is no length"),
         (("rotate", "t.urdf", "sink_1", "--by", "90"), "90 rad is 14.3 turns"),
+        (("add", "fixture", "t.urdf", "sink", "--pose", "1,1,90"), "degrees are written 90deg"),
         (("array", "t.urdf", "sink_1", "--count", "2"), "one of --pitch M and --step X,Y"),
         (("set", "t.urdf", "sink_1", "class"), "'class' is not KEY=VALUE"),
         (("adopt", "t.urdf", "--class", "sink_1"), "'sink_1' is not NAME=CLASS"),
@@ -195,6 +198,15 @@ def test_what_cannot_be_done_is_said_and_nothing_is_written(words, said, run_her
     assert "Traceback" not in done.err
     assert (tmp_path / "t.urdf").read_bytes() == FLOOR
     assert {path.name for path in tmp_path.iterdir()} == {"t.urdf", "broken.urdf"}
+
+
+@pytest.mark.parametrize("yaw", ["1.57", "1.5708", "90deg", "1.5707963267948966rad"])
+def test_a_rounded_right_angle_is_a_right_angle(yaw, run_here, tmp_path):
+    (tmp_path / "t.urdf").write_bytes(FLOOR)
+    assert run_here("add", "fixture", "t.urdf", "furniture", "desk", "--pose", f"1.5,3,{yaw}").code == 0
+    assert load_map(tmp_path / "t.urdf").joints["at_desk"].T_parent_child[:2, :2] == pytest.approx(
+        np.array([[0, -1], [1, 0]]), abs=1e-5
+    )
 
 
 def test_an_edit_warns_of_what_it_breaks_and_of_nothing_else(run_here, tmp_path):

@@ -72,7 +72,6 @@ set_option = click.option(
 seed_option = click.option("--seed", type=int, default=0, show_default=True, help="Seed of every random choice.")
 json_option = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
 quiet_option = click.option("-q", "--quiet", is_flag=True, help="No progress and no warnings.")
-verbose_option = click.option("-v", "--verbose", count=True, help="Say more; repeat for more still.")
 dry_run_option = click.option("--dry-run", is_flag=True, help="Check everything, say what would be done, do nothing.")
 color_option = click.option(
     "--color",

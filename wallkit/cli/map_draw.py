@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from wallkit.cli import common
+from wallkit.cli.map_words import FILE, PLANE
 
 if TYPE_CHECKING:
     from wallkit.maps.model import SemanticMap
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path), metavar="FILE")
+@FILE
 @common.out_option
 @click.option(
     "--findings",
@@ -23,7 +24,9 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Mark the errors and warnings of `map validate`, by number and code.",
 )
-@click.option("--z", "plane", metavar="M|lidar", help="Bold what a plane at this height cuts, all else light.")
+@click.option(
+    "--z", "plane", type=PLANE, metavar="M|lidar", help="Bold what a plane at this height cuts, all else light."
+)
 @click.option("--names", is_flag=True, help="Write every link's name beside it.")
 @click.option("--width", "width_px", type=click.IntRange(200, 8000), default=1000, show_default=True, help="In pixels.")
 @common.config_option
@@ -38,7 +41,7 @@ def show(
     file: Path,
     out: Path | None,
     with_findings: bool,
-    plane: str | None,
+    plane: float | str | None,
     names: bool,
     width_px: int,
     config_path: Path | None,

@@ -7,19 +7,20 @@ from pathlib import Path
 import click
 
 from wallkit.cli import common
+from wallkit.cli.map_words import FILE, HEIGHT, Number
 
 FORMATS = "pgm|fields|urdf|svg|geojson|sdf|rmf"
 
 
 @click.command("export")
-@click.argument("file", type=click.Path(path_type=Path), metavar="FILE")
+@FILE
 @common.out_option
 @click.option("--format", "format_name", metavar=FORMATS, help="Of PATH; else its suffix tells.")
-@click.option("--z", "z_m", type=click.FloatRange(min=0), metavar="M", help="Height of the cut; else the scan plane.")
+@click.option("--z", "z_m", type=HEIGHT, metavar="M", help="Height of the cut; else the scan plane.")
 @click.option(
     "--resolution",
     "cell_m",
-    type=click.FloatRange(min=0, min_open=True),
+    type=Number("length", above=0.0),
     metavar="M",
     help="Side of a cell; else 0.05 (pgm), 0.025 (fields).",
 )

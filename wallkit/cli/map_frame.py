@@ -6,15 +6,17 @@ from pathlib import Path
 
 import click
 
-from wallkit.cli.map_words import ANGLE, FILE, POSE, edit_options, finish
+from wallkit.cli.map_words import ANGLE, FILE, LENGTH, POSE, edit_options, finish
 
 
 @click.command()
 @FILE
 @click.option("--class", "classes", multiple=True, metavar="NAME=CLASS", help="Of elements whose name does not tell.")
 @click.option("--level", default="1", show_default=True, help="Name of the level, for the header.")
-@click.option("--elevation", type=float, default=0.0, show_default=True, metavar="M", help="Its floor, for the header.")
-@click.option("--scan-plane", type=float, metavar="M", help="Height of the LiDAR, for the header.")
+@click.option(
+    "--elevation", type=LENGTH, default=0.0, show_default=True, metavar="M", help="Its floor, for the header."
+)
+@click.option("--scan-plane", type=LENGTH, metavar="M", help="Height of the LiDAR, for the header.")
 @edit_options
 def adopt(
     file: Path,
@@ -71,8 +73,8 @@ def scale(file: Path, factor: float, names: tuple[str, ...], dry_run: bool, as_j
 @click.option("--to", type=POSE, metavar="X,Y[,YAW]", help="Where the new frame sits in the old one.")
 @click.option("--to-corner", is_flag=True, help="The corner of the data in whole metres; so without any option.")
 @click.option("--epsg", type=int, metavar="CODE", help="The projected system of --east and --north.")
-@click.option("--east", type=float, metavar="M", help="Of the (new) origin on Earth.")
-@click.option("--north", type=float, metavar="M", help="Of the (new) origin on Earth.")
+@click.option("--east", type=LENGTH, metavar="M", help="Of the (new) origin on Earth.")
+@click.option("--north", type=LENGTH, metavar="M", help="Of the (new) origin on Earth.")
 @click.option("--yaw", type=ANGLE, metavar="ANGLE", help="From east to the map's x axis.")
 @click.option("--kind", type=click.Choice(["none", "surveyed", "georef"]), help="How the place on Earth is known.")
 @edit_options

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 import click
 
 from wallkit.cli import common
+from wallkit.cli.map_words import FILE, LENGTH
 
 if TYPE_CHECKING:
     from wallkit.pipelines.map_look import ElementRow, MapInfo
-
-FILE = click.argument("file", type=click.Path(path_type=Path), metavar="FILE")
 
 
 @click.command()
@@ -73,13 +72,15 @@ def ls(file: Path, class_name: str | None, room: str | None, as_json: bool) -> N
 @common.out_option
 @click.option("--format", "format_name", metavar="rmf|pgm|lines|dxf|csv|urdf", help="Of FILE; else its content tells.")
 @click.option("--units", metavar="m|cm|mm|in|ft", help="Of FILE's lengths; else as it declares.")
-@click.option("--thickness", "thickness_m", type=float, metavar="M", help="Of walls drawn without one.")
-@click.option("--height", "height_m", type=float, metavar="M", help="Of walls without one; else 2.5.")
+@click.option("--thickness", "thickness_m", type=LENGTH, metavar="M", help="Of walls drawn without one.")
+@click.option("--height", "height_m", type=LENGTH, metavar="M", help="Of walls without one; else 2.5.")
 @click.option(
     "--layer", "layers", multiple=True, metavar="NAME", help="Layer that holds walls, * allowed (repeatable)."
 )
-@click.option("--tolerance", "tolerance_m", type=float, metavar="M", help="Of lines fitted to a raster; else one cell.")
-@click.option("--scan-plane", "scan_plane_m", type=float, metavar="M", help="Height of the LiDAR, for the header.")
+@click.option(
+    "--tolerance", "tolerance_m", type=LENGTH, metavar="M", help="Of lines fitted to a raster; else one cell."
+)
+@click.option("--scan-plane", "scan_plane_m", type=LENGTH, metavar="M", help="Height of the LiDAR, for the header.")
 @common.overwrite_option
 @common.dry_run_option
 @common.json_option

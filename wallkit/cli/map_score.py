@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import click
 
 from wallkit.cli import common
+from wallkit.cli.map_words import ANGLE, FILE, LENGTH, SignedCommand
 
-FILE = click.argument("file", type=click.Path(path_type=Path), metavar="FILE")
 PICTURE = click.option("-o", "--out", type=click.Path(path_type=Path), metavar="PICTURE", help="A .png or .svg of it.")
 
 
@@ -62,11 +61,11 @@ def score_command(
         click.echo(f"wrote {out}")
 
 
-@click.command(context_settings={"ignore_unknown_options": True})
+@click.command(cls=SignedCommand)
 @FILE
-@click.argument("x", type=float)
-@click.argument("y", type=float)
-@click.argument("yaw", type=float)
+@click.argument("x", type=LENGTH, metavar="X")
+@click.argument("y", type=LENGTH, metavar="Y")
+@click.argument("yaw", type=ANGLE, metavar="YAW")
 @PICTURE
 @common.overwrite_option
 @common.config_option
@@ -83,13 +82,13 @@ def probe(
     words: tuple[str, ...],
     as_json: bool,
 ) -> None:
-    """Show the scan expected at X Y [m] and YAW [rad] of frame map: what is met, by how many beams, how near.
+    """Show the scan expected at X Y YAW of frame map, in metres and radians: what is met, by how many beams, how near.
 
     Exits 2 if the pose is inside something or where no floor is. Defaults as for `wallkit map score`.
 
     \b
     Examples:
-      wallkit map probe floor2.wkmap.urdf 2.5 1.0 1.57
+      wallkit map probe floor2.wkmap.urdf 2.5 1.0 90deg
       wallkit map probe floor2.wkmap.urdf 2.5 1.0 -1.57 -o scan.png
       wallkit map probe floor2.wkmap.urdf 2.5 1.0 0 --json | jq '.beams[] | select(.class == "door")'
     """
@@ -97,8 +96,6 @@ def probe(
     from wallkit.pipelines.map_heat import check_picture, probe_picture, write_picture
     from wallkit.pipelines.map_score import probe_map
 
-    if not all(map(math.isfinite, (x, y, yaw))):
-        raise click.UsageError(f"X Y YAW are numbers: {x:g} {y:g} {yaw:g}")
     kind = check_picture(out, overwrite=overwrite) if out is not None else ""
     found = probe_map(file, load_config(config_path, words).config.rules, (x, y, yaw))
     if out is not None:

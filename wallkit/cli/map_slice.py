@@ -9,22 +9,23 @@ from typing import TYPE_CHECKING
 import click
 
 from wallkit.cli import common
+from wallkit.cli.map_words import FILE, PLANE, Number
 
 if TYPE_CHECKING:
     from wallkit.maps.plane import PlaneView, Standing
     from wallkit.maps.space import Region
     from wallkit.pipelines.map_compat import Compat
 
-FILE = click.argument("file", type=click.Path(path_type=Path), metavar="FILE")
-
 
 @click.command("slice")
 @FILE
-@click.option("--z", "plane", default="lidar", show_default=True, metavar="M|lidar", help="Height; lidar: the map's.")
+@click.option(
+    "--z", "plane", type=PLANE, default="lidar", show_default=True, metavar="M|lidar", help="Height; lidar: the map's."
+)
 @click.option(
     "--wobble",
     "wobble_m",
-    type=click.FloatRange(0, 1),
+    type=Number("length", least=0.0, most=1.0),
     default=0.05,
     show_default=True,
     metavar="M",
@@ -35,7 +36,7 @@ FILE = click.argument("file", type=click.Path(path_type=Path), metavar="FILE")
 @common.json_option
 def slice_(
     file: Path,
-    plane: str,
+    plane: float | str,
     wobble_m: float,
     out: Path | None,
     overwrite: bool,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -19,6 +20,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 FILE = click.argument("file", type=click.Path(path_type=Path), metavar="FILE")
 # of more new findings the rest is counted
 _SHOWN = 5
+_SIGNED = re.compile(r"-[.0-9]")
 
 edit_options = common.options(
     click.option("--dry-run", is_flag=True, help="Print the patch and write nothing."), common.json_option
@@ -52,16 +54,54 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]  # generic only in cli
                 except ValueError:
                     continue
                 if math.isfinite(number):
-                    return number
+                    return number if kind == "length" else _angle(head, unit, number, param, ctx)
         usual = "metres, or 900mm, 90cm, 35in" if kind == "length" else "radians, or 90deg"
         raise click.BadParameter(f"'{word}' is no {kind}: {usual}", ctx, param)
 
 
+class SignedCommand(click.Command):
+    """A command whose arguments may be numbers below zero: -90cm is no row of short flags."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        # a space keeps click from looking for flags, and Numbers strips it
+        return super().parse_args(ctx, [f" {arg}" if _SIGNED.match(arg) else arg for arg in args])
+
+
+def _angle(head: str, unit: str, angle_rad: float, param: click.Parameter | None, ctx: click.Context | None) -> float:
+    """An angle that can be meant: 1.57 is a right angle, and 90 forgets its unit."""
+    from wallkit.maps.numbers import meant_angle
+
+    if abs(angle_rad) > 2 * math.pi + 1e-2:
+        turns = angle_rad / (2 * math.pi)
+        unitless = "" if unit == "deg" else f"; plain numbers are radians, degrees are written {head}deg"
+        raise click.BadParameter(f"{head} {unit or 'rad'} is {turns:.3g} turns{unitless}", ctx, param)
+    meant = None if unit == "deg" else meant_angle(head)
+    return angle_rad if meant is None else meant
+
+
 class Number(Numbers):
-    """One of them."""
+    """One of them, within limits."""
+
+    def __init__(
+        self, kind: str, *, least: float = -math.inf, most: float = math.inf, above: float = -math.inf
+    ) -> None:
+        super().__init__(kind)
+        self.least, self.most, self.above = least, most, above
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        return value if isinstance(value, float) else super().convert(value, param, ctx)[0]
+        number = value if isinstance(value, float) else super().convert(value, param, ctx)[0]
+        if number > self.above and self.least <= number <= self.most:
+            return number
+        limits = {"above": self.above, "at least": self.least, "at most": self.most}
+        said = " and ".join(f"{words} {limit:g}" for words, limit in limits.items() if math.isfinite(limit))
+        raise click.BadParameter(f"{number:g} is not {said}", ctx, param)
+
+
+class Plane(Number):
+    """A height, or the word lidar: the map's scan plane."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        return value if value == "lidar" else super().convert(value, param, ctx)
 
 
 # longer units before those they end in; the empty one last
@@ -70,6 +110,8 @@ UNITS: dict[str, dict[str, float]] = {
     "angle": {"deg": math.pi / 180, "rad": 1.0, "": 1.0},
 }
 LENGTH = Number("length")
+HEIGHT = Number("length", least=0.0)
+PLANE = Plane("length")
 ANGLE = Number("angle")
 POINT = Numbers("length", "length")
 POINT_3 = Numbers("length", "length", "length", fewest=2)

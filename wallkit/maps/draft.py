@@ -17,7 +17,7 @@ from wallkit.maps.draft_doors import DraftDoor
 
 WALL_HEIGHT_M = 2.5
 # pieces of wall shorter than this beside an opening are rounding, not walls
-SLIVER_M = 0.001
+SLIVER_M = 0.005
 
 
 @dataclass(frozen=True, slots=True)

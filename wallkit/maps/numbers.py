@@ -13,6 +13,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 LARGEST = 1e6
+# a rounding error of an angle of less moves nothing by a millimetre within ten metres
+ROUNDED_RAD = 1e-4
+
+_EIGHTH_TURN_RAD = math.pi / 4
+_ROUNDED_DECIMALS = 4
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _NOT_FINITE = re.compile(r"[+-]?(?:nan|inf|infinity|1\.#.*)", re.IGNORECASE)
@@ -87,6 +92,22 @@ def trouble_in(text: str, count: int | None = None, *, largest: float = LARGEST)
 def text_from_number(value: float, digits: int = 9) -> str:
     """The shortest plain way to write a number with so many significant digits."""
     return f"{value:.{digits}g}"
+
+
+def meant_angle(word: str) -> float | None:
+    """The multiple of 45 degrees [rad] that a word of two to four decimals rounds or cuts off; None for all else.
+
+    >>> meant_angle("1.57") == math.pi / 2, meant_angle("1.5"), meant_angle("1.5707963")
+    (True, None, None)
+    """
+    decimals = len(word.partition(".")[2])
+    if not 2 <= decimals <= _ROUNDED_DECIMALS or not word.lstrip("+-").replace(".", "", 1).isdigit():
+        return None
+    value = float(word)
+    exact = round(value / _EIGHTH_TURN_RAD) * _EIGHTH_TURN_RAD
+    cut_off = math.trunc(exact * 10**decimals) / 10**decimals
+    is_rounded = abs(value - round(exact, decimals)) < 1e-9 or abs(value - cut_off) < 1e-9
+    return exact if is_rounded and abs(value - exact) > ROUNDED_RAD else None
 
 
 def _complaint(word: str, largest: float) -> Complaint | None:

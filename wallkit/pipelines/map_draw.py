@@ -34,24 +34,19 @@ def map_with_findings(path: Path, selection: Selection | None) -> tuple[Semantic
     return report.map, tuple(finding for finding in report.findings if finding.severity != "info")
 
 
-def plane_of(semantic_map: SemanticMap, word: str | None) -> float | None:
-    """The height meant by a number, or by "lidar": the map's scan plane.
+def plane_of(semantic_map: SemanticMap, plane: float | str | None) -> float | None:
+    """The height [m] meant by a number, or by "lidar": the map's scan plane. None stays None.
 
     Raises:
-        MapError: it is neither, or the map does not say its scan plane.
+        MapError: the map does not say its scan plane.
     """
-    if word is None:
-        return None
-    if word == "lidar":
-        plane = semantic_map.header.scan_plane_m
-        if plane is None:
+    if plane == "lidar":
+        plane_m = semantic_map.header.scan_plane_m
+        if plane_m is None:
             hint = "name a height: --z 0.3, or write scan_plane into <wk:map>"
             raise MapError("the map does not say the LiDAR's height", where=semantic_map.source, hint=hint)
-        return plane
-    try:
-        return float(word)
-    except ValueError as error:
-        raise MapError(f"'{word}' is no height", hint="a number of metres, or the word lidar") from error
+        return plane_m
+    return None if plane is None else float(plane)
 
 
 def check_target(out: Path, *, overwrite: bool) -> None:

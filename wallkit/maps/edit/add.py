@@ -158,7 +158,8 @@ def add_room(
             and polygon.intersection(Polygon(floor)).buffer(-0.025).area > 0
         ):
             message = f"room '{name}' would share {common:.3g} m2 with room '{other}'"
-            raise refuse(context, message, "a piece of floor belongs to one room")
+            hint = f"a piece of floor belongs to one room: first wallkit map remove {context.document.source} {other}"
+            raise refuse(context, message, hint)
     corners = tuple((float(x), float(y)) for x, y in floor)
     edits = _in_header(context, room_line(DraftRoom(name, kind, corners)), wk("room"))
     said = f"room {name}: added, {len(corners)} corners, {number_text(round(Polygon(floor).area, 4))} m2"

@@ -97,13 +97,9 @@ def rotate(
     """An element turned about the upright axis through its frame, or through (x, y) in the map; anticlockwise from above.
 
     Raises:
-        MapError: no such element, it hangs on nothing, fills an opening, or the angle is more than a full turn.
+        MapError: no such element, it hangs on nothing, or fills an opening.
     """
     joint = joint_above(context, name)
-    if not abs(by_rad) <= 2 * math.pi:
-        turns = by_rad / (2 * math.pi)
-        message = f"{by_rad:g} rad is {turns:.3g} turns"
-        raise refuse(context, message, f"plain numbers are radians; degrees are written {by_rad:g}deg")
     _check_fills_nothing(
         context, name, "turned", "a door turns by its joint; hang it on the other side with `add door`"
     )

@@ -78,7 +78,7 @@ def _wall_layers(path: Path, drawing: Drawing, options: ImportOptions) -> list[s
         raise MapError(
             f"{wanted}; there are {listed}" if listed else "draws no lines",
             where=path,
-            hint="name the wall layers with --layers; * stands for any text"
+            hint="name the wall layers with --layer; * stands for any text"
             if listed
             else "export the plan's model space",
         )
@@ -244,7 +244,7 @@ def _say(drawing: Drawing, layers: list[str], walls: list[DraftWall], unit: str,
     others = {layer: len(pieces) for layer, pieces in drawing.pieces.items() if layer not in layers}
     if others:
         listed = ", ".join(f"'{layer}' ({count})" for layer, count in sorted(others.items(), key=lambda o: -o[1]))
-        notes.skipped(f"lines on layers that hold no walls: {listed}", hint="--layers names the layers to read")
+        notes.skipped(f"lines on layers that hold no walls: {listed}", hint="--layer names the layers to read")
     if drawing.passed_over:
         notes.skipped(f"{len(drawing.passed_over)} entities that draw no line: {tally(drawing.passed_over)}")
     if float(np.abs(drawing.extent).max()) * scale > FAR_M:

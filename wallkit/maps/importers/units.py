@@ -91,7 +91,7 @@ def finding_of(verdict: UnitVerdict, path: Path, line: int | None = None) -> Fin
         str(path),
         f"says {NAMES[declared]}, but looks drawn in {NAMES[inferred]}: {'; '.join(verdict.reasons)}",
         line=line,
-        hint=f"read again with --units {inferred}, or with --units {declared} if it is right",
+        hint=f"read again with --units {inferred} --overwrite, or with --units {declared} if it is right",
         detail={"declared": declared, "inferred": inferred, "shares": verdict.shares},
     )
 

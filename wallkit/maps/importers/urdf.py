@@ -36,7 +36,9 @@ def read_urdf(path: Path, options: ImportOptions) -> Imported:
     )
     for line in changes.said:
         line = line.replace("; say it: --class NAME=CLASS", "")  # the flag of `map adopt`
-        notes.guessed(line, hint="`wallkit map set NAME class=CLASS` says another" if "by its name" in line else "")
+        notes.guessed(
+            line, hint="`wallkit map set FILE NAME class=CLASS` says another" if "by its name" in line else ""
+        )
     _say_meshes(semantic_map, notes)
     data = apply_edits(semantic_map.document.data, changes.edits)
     draft = Draft(path.name.split(".")[0], level=semantic_map.header.level or "1", source=path.name)

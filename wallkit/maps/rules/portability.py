@@ -150,7 +150,9 @@ def p007_no_visual(context: Context) -> Iterator[Problem]:
     solid = sum(len(link.findall("collision")) for link in links)
     if solid and not any(link.find("visual") for link in links):
         message = f"none of the {solid} shapes is a <visual>: RViz shows nothing"
-        yield Problem(context.root, message, f"wallkit map export urdf {context.document.source}")
+        source = context.document.source
+        visible = source.removesuffix(".urdf").removesuffix(".wkmap") + "_visual.urdf"
+        yield Problem(context.root, message, f"wallkit map export {source} -o {visible}")
 
 
 def p008_many(context: Context) -> Iterator[Problem]:

@@ -9,14 +9,10 @@ import numpy as np
 
 from wallkit.maps.document import Attribute, Element
 from wallkit.maps.nouns import Shape
-from wallkit.maps.numbers import numbers_from_text, text_from_number
+from wallkit.maps.numbers import ROUNDED_RAD, meant_angle, numbers_from_text, text_from_number
 from wallkit.maps.rules.base import Context, Problem, Rule
 from wallkit.maps.rules.solids import sound_parts, sound_runs
 
-_EIGHTH_TURN_RAD = math.pi / 4
-# a rounding error of less moves nothing by a millimetre within ten metres
-_ROUNDED_RAD = 1e-4
-_ROUNDED_DECIMALS = 4
 _THIN_CLASSES = ("glass", "mirror", "window")
 # what begins higher up is a lintel, not a wall that hangs in the air
 _LINTEL_M = 1.5
@@ -140,7 +136,7 @@ def e030_rounded_angle(context: Context) -> Iterator[Problem]:
     """
     for name, attribute, reach_m in _angles(context):
         words = attribute.value.split()
-        exact = [_meant_angle(word) for word in words]
+        exact = [meant_angle(word) for word in words]
         if any(angle is not None for angle in exact):
             pairs = list(zip(words, exact, strict=True))
             off_rad = max(abs(float(word) - angle) for word, angle in pairs if angle is not None)
@@ -163,7 +159,7 @@ def e031_degrees(context: Context) -> Iterator[Problem]:
     """
     for name, attribute, _ in _angles(context):
         words = attribute.value.split()
-        if any(abs(float(word)) > 2 * math.pi + _ROUNDED_RAD for word in words):
+        if any(abs(float(word)) > 2 * math.pi + ROUNDED_RAD for word in words):
             text = " ".join(text_from_number(math.radians(float(word)), 8) for word in words)
             message = f"the angles of '{name}', {attribute.value}, are more than a full turn: degrees?"
             yield Problem(attribute, message, f'rpy="{text}"', edits=(attribute.replaced_by(text),))
@@ -234,18 +230,6 @@ def _reach_m(context: Context, link: str) -> float:
     origin = context.poses[link][:3, 3]
     carried = (part for name in context.map.subtree(link) for part in context.parts_by_link.get(name, ()))
     return max((float(np.linalg.norm(part.corners - origin, axis=1).max()) for part in carried), default=0.0)
-
-
-def _meant_angle(word: str) -> float | None:
-    """The multiple of 45 degrees that a word of two to four decimals rounds or cuts off; None for all else."""
-    decimals = len(word.partition(".")[2])
-    if not 2 <= decimals <= _ROUNDED_DECIMALS or not word.lstrip("+-").replace(".", "", 1).isdigit():
-        return None
-    value = float(word)
-    exact = round(value / _EIGHTH_TURN_RAD) * _EIGHTH_TURN_RAD
-    cut_off = math.trunc(exact * 10**decimals) / 10**decimals
-    is_rounded = abs(value - round(exact, decimals)) < 1e-9 or abs(value - cut_off) < 1e-9
-    return exact if is_rounded and abs(value - exact) > _ROUNDED_RAD else None
 
 
 RULES = (
