@@ -16,7 +16,7 @@ from wallkit.simulate.camera import Masks, Shot, Unit, photograph, shot_of, soli
 from wallkit.simulate.photo import jpeg_from_pixels
 from wallkit.simulate.scenario import CameraSetup
 from wallkit.simulate.scene import NOTHING
-from wallkit.simulate.timing import Schedule
+from wallkit.simulate.timing import NEVER, Schedule
 
 # what a mask's pixel says that shows nothing
 NO_CLASS, NO_INSTANCE = 255, 65535
@@ -86,7 +86,7 @@ class CameraSensor:
 
     play: Play
     setup: CameraSetup
-    schedule: Schedule
+    schedule: Schedule = NEVER
     unit: Unit = field(init=False)
 
     def __post_init__(self) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import heapq
 import json
 import zlib
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,11 +23,14 @@ from wallkit.logs.writer import McapWriter
 from wallkit.maps.read import load_map
 from wallkit.pipelines.outputs import result_folder
 from wallkit.pipelines.run_folder import sha256, write_json
+from wallkit.pipelines.simulate_jobs import Task, messages_of
 from wallkit.pipelines.simulate_play import START_NS, Message, Play, Sensor, Serialized
 from wallkit.pipelines.simulate_sensors import sensors_of
 from wallkit.pipelines.simulate_world import world_from_map
+from wallkit.simulate.camera import Unit
 from wallkit.simulate.crowd import STEP_S, people_from
 from wallkit.simulate.floor import floor_of
+from wallkit.simulate.gl import backend
 from wallkit.simulate.robot import DEFAULT_ROBOT, robot_from_urdf
 from wallkit.simulate.route import drive
 from wallkit.simulate.scenario import Scenario
@@ -78,22 +83,25 @@ def prepare(request: LogRequest) -> Play:
 
 
 def simulate_log(
-    request: LogRequest, out: Path, *, overwrite: bool = False, progress: Progress = lambda _: None
+    request: LogRequest, out: Path, *, overwrite: bool = False, jobs: int = 1, progress: Progress = lambda _: None
 ) -> Simulated:
     """A folder with log.mcap, truth.tum, manifest.json and the map the robot is given.
 
     Args:
+        jobs: processes that make pictures.
         progress: told how many hundredths of the log are done.
 
     Raises:
-        OutputError: `out` cannot be written. Else as `prepare`.
+        OutputError: `out` cannot be written.
+        SimulationError: pictures are asked for and no OpenGL works. Else as `prepare`.
     """
-    with result_folder(out, overwrite=overwrite) as folder:
-        play = prepare(request)
+    check_pictures(request.scenario)
+    with result_folder(out, overwrite=overwrite) as folder, contextlib.closing(prepare(request)) as play:
         sensors = sensors_of(play)
+        measured = messages_of(_tasks(sensors), sensors, partial(prepare, request), jobs)
         with McapWriter(folder / "log.mcap") as file:
             _write_static(file, play)
-            counts = _write(file, _measured(sensors, play, progress))
+            counts = _write(file, _recorded(measured, play, progress))
         write_tum(folder / "truth.tum", Trajectory(play.stamps_ns[::5], play.poses[::5]))
         (folder / "map.wkmap.urdf").write_bytes(request.map_path.read_bytes())
         steps = np.hypot(*np.diff(play.poses[:, :2], axis=0).T)
@@ -108,26 +116,44 @@ def simulate_log(
 # -------------------------------------------------------------------------------------------- the log
 
 
-def _measured(sensors: dict[str, Sensor], play: Play, progress: Progress) -> Iterator[tuple[int, Message]]:
-    """Every message with its record time, in the order in which they are recorded."""
-    plan = [
-        (int(time_ns), number, int(stamp_ns), int(log_ns))
-        for number, sensor in enumerate(sensors.values())
+def check_pictures(scenario: Scenario) -> None:
+    """Whether the scenario's pictures can be made.
+
+    Raises:
+        SimulationError: no OpenGL works; it says what to install.
+    """
+    if any(camera.pictures or camera.masks == "raster" for camera in scenario.cameras):
+        backend()
+
+
+def _tasks(sensors: dict[str, Sensor]) -> list[Task]:
+    """Every measurement in order of time; of the same moment in the sensors' order."""
+    order = {name: number for number, name in enumerate(sensors)}
+    tasks = [
+        Task(name, START_NS + int(time_ns), START_NS + int(stamp_ns), START_NS + int(log_ns))
+        for name, sensor in sensors.items()
         for time_ns, stamp_ns, log_ns in zip(
             sensor.schedule.times_ns, sensor.schedule.stamps_ns, sensor.schedule.logs_ns, strict=True
         )
     ]
+    return sorted(tasks, key=lambda task: (task.at_ns, order[task.sensor]))
+
+
+def _recorded(
+    measured: Iterable[tuple[Task, list[Message]]], play: Play, progress: Progress
+) -> Iterator[tuple[int, Message]]:
+    """Every message with its record time, in the order in which they are recorded."""
     waiting: list[tuple[int, int, Message]] = []
-    by_number, sequence = list(sensors.values()), 0
-    for time_ns, number, stamp_ns, log_ns in sorted(plan):
+    sequence = 0
+    for task, messages in measured:
         # nothing that is still to be measured can be recorded before now
-        while waiting and waiting[0][0] <= START_NS + time_ns:
+        while waiting and waiting[0][0] <= task.at_ns:
             due_ns, _, message = heapq.heappop(waiting)
             yield due_ns, message
-        for message in by_number[number].measure(START_NS + time_ns, START_NS + stamp_ns):
-            heapq.heappush(waiting, (START_NS + log_ns, sequence, message))
+        for message in messages:
+            heapq.heappush(waiting, (task.log_ns, sequence, message))
             sequence += 1
-        progress(int(100 * time_ns / 1e9 / max(play.duration_s, 1e-9)))
+        progress(int(100 * (task.at_ns - START_NS) / 1e9 / max(play.duration_s, 1e-9)))
     while waiting:
         due_ns, _, message = heapq.heappop(waiting)
         yield due_ns, message
@@ -176,6 +202,24 @@ def _manifest(request: LogRequest, play: Play, done: Simulated) -> dict[str, Any
         "messages": done.messages,
         "dropped": done.dropped,
         "classes": list(play.world.class_names),
+        "cameras": {name: _unit_truth(unit) for name, unit in play.units.items()},
+    }
+
+
+def _unit_truth(unit: Unit) -> dict[str, Any]:
+    """What a camera is, beside what it says it is."""
+    return {
+        "frame": unit.frame,
+        "model": unit.true.model,
+        "size": [unit.true.width, unit.true.height],
+        "K": unit.true.K.tolist(),
+        "D": unit.true.D.tolist(),
+        "T_base_optical": unit.T_base_true.tolist(),
+        "published": {
+            "K": unit.published.K.tolist(),
+            "D": unit.published.D.tolist(),
+            "T_base_optical": unit.T_base_published.tolist(),
+        },
     }
 
 

@@ -23,6 +23,10 @@ class Schedule:
     dropped: int
 
 
+_NONE = np.zeros(0, dtype=np.int64)
+NEVER = Schedule(_NONE, _NONE, _NONE, 0)
+
+
 def schedule(rng: np.random.Generator, timing: Timing, rate_hz: float, duration_s: float) -> Schedule:
     """All measurements of one sensor in a log. Jitter never swaps two of them."""
     times = np.arange(timing.phase_s, duration_s, 1 / rate_hz)
