@@ -99,10 +99,12 @@ def test_pixels_look_where_the_lens_says(lens):
     if optics.columns is None:
         return
     # and the sheet's pinholes find the same rays
-    for k, (eye, R) in enumerate(optics.eyes):
-        here = (optics.rows >= k * eye.height) & (optics.rows < (k + 1) * eye.height) & optics.sees
+    above = 0
+    for eye, R in optics.eyes:
+        here = (optics.rows >= above) & (optics.rows < above + eye.height) & optics.sees
         x = (optics.columns[here] - eye.cx) / eye.fx
-        y = (optics.rows[here] - k * eye.height - eye.cy) / eye.fy
+        y = (optics.rows[here] - above - eye.cy) / eye.fy
+        above += eye.height
         rays = np.column_stack([x, y, np.ones_like(x)]) @ R.T
         rays /= np.linalg.norm(rays, axis=1, keepdims=True)
         np.testing.assert_allclose(rays, optics.rays[here], atol=1e-5)

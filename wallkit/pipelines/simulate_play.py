@@ -99,7 +99,10 @@ class Play:
 
     def pose_at(self, at_ns: int) -> Float64Array:
         """(3,) T_map_base."""
-        return np.asarray(interpolate_poses(self.stamps_ns, self.poses, [at_ns])[0])
+        # only the two poses around it: the angles of a whole log are not unwrapped for each beam
+        after = int(np.clip(np.searchsorted(self.stamps_ns, at_ns), 1, len(self.stamps_ns) - 1))
+        around = slice(after - 1, after + 1)
+        return np.asarray(interpolate_poses(self.stamps_ns[around], self.poses[around], [at_ns])[0])
 
 
 class Sensor(Protocol):

@@ -92,22 +92,27 @@ def _one_larger(rays: Float64Array, sees: BoolArray, flat: Float64Array, fx: flo
 
 
 def _cube(rays: Float64Array, sees: BoolArray, focal: float) -> Optics:
-    """Sides of 90 degrees and a margin, only those that are looked through, as fine as the camera is in its middle."""
-    half = int(np.ceil(focal)) + _MARGIN_PX
-    eye = Pinhole(2 * half + 1, 2 * half + 1, focal, focal, half, half)
+    """The sides of a cube that are looked through, of each the part that is, as fine as the camera is in its middle."""
     names = list(_SIDES)
     along = np.stack([rays @ _SIDES[name][:, 2] for name in names], axis=-1)
     side = np.where(sees, np.argmax(np.nan_to_num(along, nan=-2.0), axis=-1), -1)
     columns, rows = np.zeros(rays.shape[:2]), np.zeros(rays.shape[:2])
-    eyes: list[tuple[Pinhole, Float64Array]] = []
+    found: list[tuple[int, BoolArray, Float64Array]] = []
     for number, name in enumerate(names):
-        here = side == number
-        if not here.any():
-            continue
-        turned = rays[here] @ _SIDES[name]
-        columns[here] = turned[:, 0] / turned[:, 2] * focal + half
-        rows[here] = turned[:, 1] / turned[:, 2] * focal + half + len(eyes) * eye.height
-        eyes.append((eye, _SIDES[name].astype(np.float64)))
+        here = np.asarray(side == number)
+        if here.any():
+            turned = rays[here] @ _SIDES[name]
+            found.append((number, here, turned[:, :2] / turned[:, 2:] * focal))
+    # pictures of one width stand above each other
+    spans = [np.ceil(np.ptp(places, axis=0)).astype(int) + 2 * _MARGIN_PX + 1 for _, _, places in found]
+    width = int(max(span[0] for span in spans))
+    eyes: list[tuple[Pinhole, Float64Array]] = []
+    above = 0
+    for (number, here, places), span in zip(found, spans, strict=True):
+        left, top = np.floor(places.min(axis=0)) - _MARGIN_PX
+        eyes.append((Pinhole(width, int(span[1]), focal, focal, -left, -top), _SIDES[names[number]].astype(np.float64)))
+        columns[here], rows[here] = places[:, 0] - left, places[:, 1] - top + above
+        above += int(span[1])
     return Optics(rays, sees, tuple(eyes), *_filled(sees, columns, rows))
 
 
