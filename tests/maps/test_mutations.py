@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from tests.maps.drawn import LOCALISABILITY
 from tests.maps.faults import FAULTS, mutants
+from tests.maps.faults_of_use import FAULTS_OF_USE, hall
 from tests.maps.random_maps import clean_map
 from wallkit.maps.document import Document, Edit, apply_edits, wk
 from wallkit.maps.rules import validate as validate_all
@@ -50,6 +51,21 @@ def test_every_fault_is_noticed(name):
 @pytest.mark.parametrize("seed", range(25))
 def test_a_clean_map_raises_no_alarm(seed):
     report = validate(clean_map(np.random.default_rng([1, seed]), turned=seed % 2 == 0))
+    assert [(f.code, f.message) for f in report.findings if f.severity != "info"] == []
+
+
+@pytest.mark.parametrize("name", FAULTS_OF_USE)
+def test_every_fault_of_use_is_noticed(name):
+    rule, make = FAULTS_OF_USE[name]
+    for seed in range(5):
+        codes = {finding.code for finding in validate_all(make(np.random.default_rng([7, seed]))).findings}
+        assert rule in codes, (name, seed, sorted(codes))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(10))
+def test_a_hall_that_looks_different_everywhere_raises_no_alarm(seed):
+    report = validate_all(hall(np.random.default_rng([8, seed])))
     assert [(f.code, f.message) for f in report.findings if f.severity != "info"] == []
 
 

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wallkit.core.types import Float64Array
+from wallkit.maps.document import Element
 from wallkit.maps.geometry import slice_parts
 from wallkit.maps.rules.base import Context, Problem, Rule
-from wallkit.maps.rules.floods import flood, flood_plane_m, holes
+from wallkit.maps.rules.floods import Hole, flood, flood_plane_m, holes, sealed_regions
 from wallkit.maps.rules.solids import sound_runs, structure
 from wallkit.maps.space import Region
 
@@ -105,7 +106,8 @@ def l007_mirror(context: Context) -> Iterator[Problem]:
     ]
     if not mirrors:
         return
-    floor = shapely.union_all([region.polygon for region in context.once(fine_regions) if not region.is_outside])
+    # doors closed: a room whose door leads out is floor all the same
+    floor = shapely.union_all([region.polygon for region in context.once(sealed_regions) if not region.is_outside])
     for part, polygon in mirrors:
         for behind in _behind(polygon, floor):
             phantom = floor.intersection(behind)
@@ -164,6 +166,10 @@ def l012_narrow_way(context: Context) -> Iterator[Problem]:
     import shapely
 
     cell_m = context.tolerances.cell_m
+    # a declared one also where there is another way round, so that closing it parts nothing
+    narrow = [hole for hole in context.once(holes) if np.ptp(hole.opening.along_m) < 2 * cell_m]
+    for hole in narrow:
+        yield _narrow(hole.opening.element, _of(hole), float(np.ptp(hole.opening.along_m)), cell_m, hole.centre)
     cut = slice_parts(context.once(structure), flood_plane_m(context))
     if not _has_narrow_ways(cut.polygons, 2 * cell_m):
         return
@@ -181,13 +187,22 @@ def l012_narrow_way(context: Context) -> Iterator[Problem]:
             x, y = way.centroid.x, way.centroid.y
             width_m = 2 * min(float(polygon.distance(way.centroid)) for polygon in cut.polygons)
             hole = next((h for h in context.once(holes) if h.footprint.intersects(way)), None)
-            what = f"opening '{hole.opening.id}' of '{hole.wall.name}'" if hole is not None else "a way through"
-            message = f"{what} is {width_m * 100:.2g} cm wide, less than two cells of {cell_m:g} m: a raster closes it"
-            at = hole.opening.element if hole is not None else context.root
-            yield Problem(at, message, "close it, or draw rasters with smaller cells", xyz=(x, y))
+            if hole is None:
+                yield _narrow(context.root, "a way through", width_m, cell_m, np.array([x, y]))
+            elif hole not in narrow:
+                yield _narrow(hole.opening.element, _of(hole), width_m, cell_m, np.array([x, y]))
 
 
 # -------------------------------------------------------------------------------------------- details
+
+
+def _narrow(at: Element, what: str, width_m: float, cell_m: float, place: Float64Array) -> Problem:
+    message = f"{what} is {width_m * 100:.2g} cm wide, less than two cells of {cell_m:g} m: a raster closes it"
+    return Problem(at, message, "close it, or draw rasters with smaller cells", xyz=tuple(place.tolist()))
+
+
+def _of(hole: Hole) -> str:
+    return f"opening '{hole.opening.id}' of '{hole.wall.name}'"
 
 
 def _has_narrow_ways(polygons: Sequence[Polygon], width_m: float) -> bool:
