@@ -61,7 +61,8 @@ def _with(data: bytes, before: str, after: str) -> bytes:
 
 def _place_in_wall(rng: np.random.Generator) -> bytes:
     x = float(rng.uniform(0.5, 3.5))
-    link = f'<link name="start_1"/><joint name="at_start" type="fixed"><parent link="west"/><child link="start_1"/><origin xyz="{x:.3f} 0 0"/></joint>'
+    joint = f'<parent link="west"/><child link="start_1"/><origin xyz="{x:.3f} 0 0"/>'
+    link = f'<link name="start_1"/><joint name="at_start" type="fixed">{joint}</joint>'
     return _with(hall(rng), "</robot>", f"{link}</robot>")
 
 

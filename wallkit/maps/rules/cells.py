@@ -167,9 +167,10 @@ def l012_narrow_way(context: Context) -> Iterator[Problem]:
 
     cell_m = context.tolerances.cell_m
     # a declared one also where there is another way round, so that closing it parts nothing
-    narrow = [hole for hole in context.once(holes) if np.ptp(hole.opening.along_m) < 2 * cell_m]
-    for hole in narrow:
-        yield _narrow(hole.opening.element, _of(hole), float(np.ptp(hole.opening.along_m)), cell_m, hole.centre)
+    widths_m = {hole: float(np.ptp(hole.opening.along_m)) for hole in context.once(holes)}
+    narrow = {hole: width_m for hole, width_m in widths_m.items() if _CHINK_M < width_m < 2 * cell_m}
+    for declared, width_m in narrow.items():
+        yield _narrow(declared.opening.element, _of(declared), width_m, cell_m, declared.centre)
     cut = slice_parts(context.once(structure), flood_plane_m(context))
     if not _has_narrow_ways(cut.polygons, 2 * cell_m):
         return
