@@ -54,11 +54,11 @@ def run_here(here, monkeypatch, capsys):
 # ---------------------------------------------------------------------------------------------------- validate
 
 
-def test_validate_exits_with_its_verdict(wallkit, here):
-    assert wallkit("map", "validate", "clean.urdf", *SELECT, "--strict").code == 0
-    assert wallkit("map", "validate", "warned.urdf", *SELECT).code == 0
-    assert wallkit("map", "validate", "warned.urdf", *SELECT, "--strict").code == 1
-    assert wallkit("map", "validate", "clean.urdf", "comma.urdf", *SELECT).code == 1
+def test_validate_exits_with_its_verdict(run_here, here):
+    assert run_here("map", "validate", "clean.urdf", *SELECT, "--strict").code == 0
+    assert run_here("map", "validate", "warned.urdf", *SELECT).code == 0
+    assert run_here("map", "validate", "warned.urdf", *SELECT, "--strict").code == 1
+    assert run_here("map", "validate", "clean.urdf", "comma.urdf", *SELECT).code == 1
 
 
 def test_validate_says_what_it_could_not_do(run_here, here):
@@ -164,15 +164,15 @@ def test_explain_and_rules_tell_of_the_same_rules(run_here):
 # --------------------------------------------------------------------------------------------------------- fix
 
 
-def test_fix_makes_safe_repairs_once(wallkit, here):
-    done = wallkit("map", "fix", "comma.urdf", "suffix.urdf")
+def test_fix_makes_safe_repairs_once(run_here, here):
+    done = run_here("map", "fix", "comma.urdf", "suffix.urdf")
     assert (here / "comma.urdf").read_bytes() == CLEAN
     assert (here / "suffix.urdf").read_bytes() == SUFFIX
     assert "comma.urdf:4:" in done.out
     assert "comma.urdf: 1 fixed" in done.out
     assert done.code == 1
-    assert wallkit("map", "fix", "comma.urdf").out.startswith("comma.urdf: 0 fixed")
-    wallkit("map", "fix", "suffix.urdf", "--fix", "moderate")
+    assert run_here("map", "fix", "comma.urdf").out.startswith("comma.urdf: 0 fixed")
+    run_here("map", "fix", "suffix.urdf", "--fix", "moderate")
     assert (here / "suffix.urdf").read_bytes() == CLEAN.replace(b"1 0.4 0.4", b"1 0.4 0.4")
 
 
@@ -247,19 +247,19 @@ wall_b,wall,2,3,1.25,0,4,0.1,2.5
 """
 
 
-def test_import_writes_a_map_that_validates(wallkit, here):
+def test_import_writes_a_map_that_validates(run_here, here):
     (here / "boxes.csv").write_text(BOXES)
-    dry = wallkit("map", "import", "boxes.csv", "-o", "new.wkmap.urdf", "--units", "m", "--dry-run")
+    dry = run_here("map", "import", "boxes.csv", "-o", "new.wkmap.urdf", "--units", "m", "--dry-run")
     assert (dry.code, (here / "new.wkmap.urdf").exists()) == (0, False), dry.err
     assert "would write new.wkmap.urdf: level 1, " in dry.out
-    done = wallkit("map", "import", "boxes.csv", "-o", "new.wkmap.urdf", "--units", "m", "--scan-plane", "0.4")
+    done = run_here("map", "import", "boxes.csv", "-o", "new.wkmap.urdf", "--units", "m", "--scan-plane", "0.4")
     assert done.code == 0
     assert "import.read" in done.out
-    assert wallkit("map", "validate", "new.wkmap.urdf", *SELECT).code == 0
-    assert wallkit("map", "info", "new.wkmap.urdf", "--json").json["scan_plane_m"] == 0.4
-    again = wallkit("map", "import", "boxes.csv", "-o", "new.wkmap.urdf", "--units", "m")
+    assert run_here("map", "validate", "new.wkmap.urdf", *SELECT).code == 0
+    assert run_here("map", "info", "new.wkmap.urdf", "--json").json["scan_plane_m"] == 0.4
+    again = run_here("map", "import", "boxes.csv", "-o", "new.wkmap.urdf", "--units", "m")
     assert (again.code, "new.wkmap.urdf: exists" in again.err) == (2, True)
-    assert wallkit("map", "import", "boxes.csv", "-o", "new.wkmap.urdf", "--units", "cm", "--overwrite").code != 2
+    assert run_here("map", "import", "boxes.csv", "-o", "new.wkmap.urdf", "--units", "cm", "--overwrite").code != 2
 
 
 def test_import_says_what_it_cannot_do(run_here, here):
@@ -277,15 +277,15 @@ def test_import_says_what_it_cannot_do(run_here, here):
 
 
 @pytest.mark.data
-def test_a_building_of_three_levels_becomes_three_maps(wallkit, data, tmp_path):
+def test_a_building_of_three_levels_becomes_three_maps(run_here, data, tmp_path):
     hotel = data / "maps/rmf/hotel.building.yaml"
-    one = wallkit("map", "import", hotel, "-o", "hotel.wkmap.urdf")
+    one = run_here("map", "import", hotel, "-o", "hotel.wkmap.urdf")
     assert (one.code, "is one file for 3 levels (L1, L2, L3)" in one.err) == (2, True)
-    done = wallkit("map", "import", hotel, "-o", "hotel", "--json")
+    done = run_here("map", "import", hotel, "-o", "hotel", "--json")
     assert done.code == 0
     files = [row["file"] for row in done.json["files"]]
     assert files == [f"hotel/hotel_L{n}.wkmap.urdf" for n in (1, 2, 3)]
-    assert wallkit("map", "validate", *files, *SELECT).code == 0
+    assert run_here("map", "validate", *files, *SELECT).code == 0
     codes = {note["code"] for note in done.json["notes"]}
     assert codes >= {"import.read", "import.guessed", "import.skipped"}
 
@@ -328,12 +328,12 @@ def flat_here(here):
     return here
 
 
-def test_export_writes_whole_files_and_says_what_is_lost(wallkit, flat_here):
-    dry = wallkit("map", "export", "flat.wkmap.urdf", "-o", "out/flat.yaml", "--dry-run")
+def test_export_writes_whole_files_and_says_what_is_lost(run_here, flat_here):
+    dry = run_here("map", "export", "flat.wkmap.urdf", "-o", "out/flat.yaml", "--dry-run")
     assert (dry.code, dry.err) == (0, "")
     assert "would write out/flat.pgm" in dry.out.replace("\\", "/")
     assert not (flat_here / "out").exists()
-    done = wallkit("map", "export", "flat.wkmap.urdf", "-o", "out/flat.yaml", "--doors", "open", "--json")
+    done = run_here("map", "export", "flat.wkmap.urdf", "-o", "out/flat.yaml", "--doors", "open", "--json")
     assert done.code == 0
     assert sorted(path.name for path in (flat_here / "out").iterdir()) == ["flat.pgm", "flat.yaml"]
     assert [note["code"] for note in done.json["notes"]] == ["export.wrote", "export.taken", "export.lost"]

@@ -169,6 +169,12 @@ def test_a_rename_here_and_a_change_there_are_both_made(example):
         assert b"wall_mid" not in done.data.replace(b"at_wall_mid", b"")
 
 
+def test_a_rename_reaches_every_reference():
+    text = robot(box("bin", "1 1 1"), placed("bin", "1 3 0"), '<gazebo reference="bin"/>')
+    new_name = renamed(parse(text), {"bin": "basket"})
+    assert new_name == text.replace(b'"bin', b'"basket')
+
+
 def test_two_names_for_one_link_are_a_conflict(example):
     ours, theirs = (renamed(parse(example), {"sink_1": name}) for name in ("basin", "lavabo"))
     done = merged(example, ours, theirs)

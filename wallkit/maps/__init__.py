@@ -1,1 +1,1 @@
-"""Maps of walls -> occupancy and distance fields; later: authoring and validation."""
+"""Walls as rasters and as semantic maps: read, judged, edited, drawn, and made into what a filter reads."""

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from wallkit.maps.document import Document, Edit, Element, apply_edits, wk
+from wallkit.maps.document import Document, Edit, Element, apply_edits
+from wallkit.maps.names import edits_of_names, edits_of_words
 from wallkit.maps.xml import parse
 
 
@@ -60,21 +61,10 @@ def _renamed(document: Document, names: Mapping[str, str]) -> Document:
 def _edits(document: Document, names: Mapping[str, str]) -> Iterator[Edit]:
     if document.root is None:
         return
-    for element in document.root.iter():
-        if element.tag == "link":
-            yield from _edit(element, "name", names)
-            old = element.get("name") or ""
-            for part in element.children if old in names else ():
-                attribute = part.attribute("name") if part.tag in ("collision", "visual") else None
-                if attribute is not None and attribute.value.startswith(f"{old}."):
-                    yield attribute.replaced_by(names[old] + attribute.value[len(old) :])
-        elif element.tag in ("parent", "child"):
-            yield from _edit(element, "link", names)
-        elif element.tag == wk("opening"):
-            yield from _edit(element, "fill", names)
-
-
-def _edit(element: Element, name: str, names: Mapping[str, str]) -> Iterator[Edit]:
-    attribute = element.attribute(name) if element.get(name) in names else None
-    if attribute is not None:
-        yield attribute.replaced_by(names[attribute.value])
+    yield from (edit for _, edit in edits_of_names(document.root, {"link": names}))
+    for link in document.root.findall("link"):
+        old = link.get("name") or ""
+        for part in link.children if old in names else ():
+            name = part.get("name") or ""
+            if part.tag in ("collision", "visual") and name.startswith(f"{old}."):
+                yield from edits_of_words(part, "name", {name: names[old] + name[len(old) :]})

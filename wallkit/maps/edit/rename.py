@@ -3,38 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping
-from typing import Literal, get_args
+from collections.abc import Collection, Mapping
 
 from wallkit.errors import closest
 from wallkit.maps.classes import class_from_name
-from wallkit.maps.document import Edit, Element, wk
+from wallkit.maps.document import Element
 from wallkit.maps.edit.changes import Changes
 from wallkit.maps.edit.lookup import check_new, link_named, opening_named, refuse
+from wallkit.maps.names import KINDS, Kind, edits_of_names, edits_of_words
 from wallkit.maps.rules.base import Context
-
-Kind = Literal["link", "joint", "room", "class", "opening"]
-KINDS: tuple[Kind, ...] = get_args(Kind)
-
-# (tag, attribute) that hold a name of each kind; a star stands for a list of names
-_REFERENCES: Mapping[Kind, tuple[tuple[str, str], ...]] = {
-    "link": (
-        ("link", "name"),
-        ("parent", "link"),
-        ("child", "link"),
-        (wk("opening"), "fill"),
-        ("gazebo", "reference"),
-    ),
-    "joint": (("joint", "name"), ("mimic", "joint"), ("gazebo", "reference")),
-    "room": (
-        (wk("room"), "id"),
-        (wk("object"), "connects"),
-        (wk("object"), "separates"),
-        (wk("object"), "room"),
-    ),
-    "class": ((wk("class"), "name"), (wk("object"), "class")),
-    "opening": ((wk("opening"), "id"),),
-}
 
 
 def rename(context: Context, old: str, new: str, kind: Kind | None = None) -> Changes:
@@ -54,15 +31,16 @@ def rename(context: Context, old: str, new: str, kind: Kind | None = None) -> Ch
         raise refuse(context, f"nothing is named '{old}'", closest(old, names))
     found = kinds[0]
     _check_free(context, found, old, new)
-    renames = {found: {old: new}}
+    renames: dict[Kind, Mapping[str, str]] = {found: {old: new}}
     if found == "link":
         link_named(context, old)
         renames["joint"] = _joints_of(context, old, new)
         check_new(context, new, *renames["joint"].values())
-    edits, count = _renamed(context, renames)
+    found_edits = list(edits_of_names(context.root, renames))
+    edits, count = [edit for _, edit in found_edits], sum(one == found for one, _ in found_edits)
     parts = _part_names(context, found, old, new)
     edits += [
-        edit for element, name in parts for edit in _word_replaced(element, "name", element.get("name") or "", name)
+        edit for element, name in parts for edit in edits_of_words(element, "name", {element.get("name") or "": name})
     ]
     also = [f"joint {a} -> {b}" for a, b in renames.get("joint", {}).items() if found == "link"]
     also += [f"{len(parts)} part{'s' * (len(parts) > 1)}"] if parts else []
@@ -112,39 +90,6 @@ def _joints_of(context: Context, old: str, new: str) -> dict[str, str]:
     joints = [joint for joint in context.map.all_joints if joint.child == old]
     patterns = {f"at_{old}": f"at_{new}", f"{old}_hinge": f"{new}_hinge", f"{old}_slide": f"{new}_slide"}
     return {joint.name: patterns[joint.name] for joint in joints if joint.name in patterns}
-
-
-def _renamed(context: Context, renames: Mapping[Kind, Mapping[str, str]]) -> tuple[list[Edit], int]:
-    """Edits of every attribute that holds an old name, and how many places of the first kind there are."""
-    by_tag: dict[str, list[tuple[Kind, str]]] = {}
-    for kind in renames:
-        for tag, key in _REFERENCES[kind]:
-            by_tag.setdefault(tag, []).append((kind, key))
-    edits, count, first = [], 0, next(iter(renames))
-    for element in context.root.iter():
-        # a <joint> inside <transmission> names one too, a <link> anywhere else is no link
-        is_nested = element.tag == "link" and element.parent is not context.root
-        for kind, key in by_tag.get(element.tag, ()) if not is_nested else ():
-            for old, new in renames[kind].items():
-                changed = list(_word_replaced(element, key, old, new))
-                edits += changed
-                count += len(changed) if kind == first else 0
-    return edits, count
-
-
-def _word_replaced(element: Element, key: str, old: str, new: str) -> Iterator[Edit]:
-    """One edit for each time a name stands in an attribute, alone or in a list."""
-    if old not in (element.get(key) or "").split():
-        return
-    attribute = element.attribute(key)
-    if attribute is None:
-        return
-    encoding, span = element.document.encoding, attribute.value_span
-    text = element.document.slice(span)
-    for match in re.finditer(r"\S+", text):
-        if match[0] == old:
-            at = span.offset + len(text[: match.start()].encode(encoding))
-            yield Edit(at, len(old.encode(encoding)), new.encode(encoding))
 
 
 def _part_names(context: Context, kind: Kind, old: str, new: str) -> list[tuple[Element, str]]:
