@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -15,6 +16,7 @@ from wallkit.errors import MapError
 from wallkit.maps.geometry import parts, slice_at
 from wallkit.maps.read import read_map
 from wallkit.maps.render import PlanSettings, class_style, draw_plan, plan_svg
+from wallkit.maps.render_findings import MOST_MARKED
 from wallkit.maps.render_marks import Area, Text
 from wallkit.maps.render_png import png_from_drawing
 from wallkit.maps.render_svg import svg_from_drawing
@@ -170,6 +172,15 @@ def test_findings_are_numbered_at_their_place_and_listed(data):
         assert any(finding.code in words and finding.message[:30] in words for words in texts)
         dot = group.marks[1].rings[0].mean(axis=0)
         assert dot == pytest.approx(drawing.to_page(np.array([finding.xyz[:2]]))[0], abs=1.0)
+
+
+def test_of_many_findings_the_worst_are_marked_and_the_rest_counted():
+    m = map_of(ROOM)
+    (warning, *_) = validate(ROOM.replace(b'class="sink"', b'class="sink" colour="red"'), select=["S011"]).findings
+    many = [replace(warning, severity="warning")] * MOST_MARKED + [replace(warning, severity="error")] * 3
+    groups = [group for group in draw_plan(m, findings=many).page if group.id.startswith("finding:")]
+    assert [group.title.split()[0] for group in groups] == ["WK-S011"] * MOST_MARKED + ["3"]
+    assert {group.marks[1].style for group in groups[:3]} == {"finding-error"}
 
 
 def test_a_finding_without_a_place_is_marked_at_its_link():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import json
 import random
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -99,6 +100,14 @@ def test_what_is_selected_still_waits_for_what_it_builds_on():
     assert report.skipped[0].reason.startswith("WK-S020")
     assert codes(validate(unsound, select=["S"], ignore=["WK-S020", "S004"])) == []
     assert validate(b"<broken", select=["S"]).map is None
+
+
+def test_an_unselected_rule_that_blocks_nothing_does_not_run(monkeypatch):
+    def never(context):
+        raise AssertionError("it ran")
+
+    monkeypatch.setitem(RULES, "WK-L003", replace(RULES["WK-L003"], check=never))
+    assert "WK-L003" not in validate(robot(box("a", "4 0.1 2"), placed("a", "0 0 1")), ignore=["L003"]).checked
 
 
 def test_selectors_that_name_no_rule_are_refused():

@@ -63,6 +63,7 @@ def show(
       wallkit map show floor2.wkmap.urdf -o wrong.svg --findings --overwrite
     """
     from wallkit.maps.render import PlanSettings
+    from wallkit.maps.render_findings import MOST_MARKED
     from wallkit.pipelines import map_draw as pipeline
 
     if out is not None:
@@ -78,7 +79,8 @@ def show(
     else:
         settings = PlanSettings(z_m=z_m, width_px=width_px, height_px=float(width_px), names=names)
         size = pipeline.write_plan(out, semantic_map, settings, findings)
-        marked = f", {len(findings)} findings marked" if with_findings else ""
+        first = f"{MOST_MARKED} of " if len(findings) > MOST_MARKED else ""
+        marked = f", {first}{len(findings)} findings marked" if with_findings else ""
         click.echo(f"wrote {out}: {size / 1000:.0f} kB{marked}")
     ctx.exit(common.OK)
 

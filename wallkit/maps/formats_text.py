@@ -105,7 +105,9 @@ def _sums(judged: Sequence[Judged]) -> str:
         text += f"; {ignored} ignored in place"
     if accepted := sum(len(file.accepted) for file in judged):
         text += f"; {accepted} in the baseline"
-    fixes = [finding.fix.kind for file in judged for finding in file.report.findings if finding.fix is not None]
+    # what a log showed (group A) is mended by the command in its hint: `map fix` sees no log
+    found = [finding for file in judged for finding in file.report.findings if not finding.code.startswith("WK-A")]
+    fixes = [finding.fix.kind for finding in found if finding.fix is not None]
     said = ", ".join(f"{fixes.count(kind)} {kind}" for kind in ("safe", "moderate", "risky") if kind in fixes)
     return f"{text}; with a fix: {said} (wallkit map fix)" if said else text
 

@@ -21,6 +21,9 @@ FINDING_STYLES: Mapping[str, Style] = {
     "finding-info": Style(fill="#1d5f9e", stroke="#ffffff", width_px=1.2),
     "leader": Style(stroke=INK, width_px=0.8),
 }
+# of more findings the rest is counted: a plan covered with labels shows nothing
+MOST_MARKED = 40
+_SEVERITIES = ("error", "warning", "info")
 _PILL_PX = 15.0
 _ROW_PX = 17.0
 _TEXT_PX = 10.5
@@ -34,10 +37,13 @@ def finding_groups(
     drawing: Drawing,
     bottom_px: float,
 ) -> tuple[list[Group], float]:
-    """A numbered label per finding that is somewhere, the list of all below the plan, and where the list ends."""
+    """A numbered label per finding that is somewhere, the list below the plan, and where the list ends; errors go first."""
     groups: list[Group] = []
     taken: list[tuple[float, float, float, float]] = []
     y = bottom_px + 12
+    left_out = len(findings) - MOST_MARKED
+    if left_out > 0:
+        findings = sorted(findings, key=lambda finding: _SEVERITIES.index(finding.severity))[:MOST_MARKED]
     for number, finding in enumerate(findings, start=1):
         style = f"finding-{finding.severity}"
         place = _place_of(semantic_map, finding, solids)
@@ -58,6 +64,10 @@ def finding_groups(
             ),
         ]
         groups.append(Group(f"finding:{number}", "finding", tuple(marks), f"{finding.code} {finding.message}"))
+        y += _ROW_PX
+    if left_out > 0:
+        more = Text((58.0, y), f"and {left_out} more, in the list of findings only", _TEXT_PX, colour=MUTED)
+        groups.append(Group("finding:more", "finding", (more,), f"{left_out} more findings"))
         y += _ROW_PX
     return groups, y if findings else bottom_px
 

@@ -46,7 +46,7 @@ def a001_unsupported(context: Context) -> Iterator[Problem]:
         noun = context.map.links[element.link].class_name or "element"
         if whole:
             message = f"{noun} '{element.link}' is not there: beams went through it in up to {element.through} views"
-            hint = f"wallkit map remove FILE {element.link}, if the room has changed for good"
+            hint = f"wallkit map remove {context.document.source} {element.link}, if the room has changed for good"
         else:
             message = (
                 f"{element.unsupported_m:.2f} m of the {element.observed_m:.2f} m seen of {noun} '{element.link}' are not "
@@ -123,7 +123,8 @@ def a003_shifted(context: Context) -> Iterator[Problem]:
         moved = np.sum([np.array(s.normal) * s.offset_m for s in off], axis=0) if off else np.zeros(2)
         joint = context.map.parent_joint(element.link)
         edits = _moved_by(context, joint, moved) if off and joint is not None else ()
-        hint = f"wallkit map move FILE {element.link} --by {moved[0]:.3f},{moved[1]:.3f}" if off else ""
+        by = f"--by {moved[0]:.3f},{moved[1]:.3f}"
+        hint = f"wallkit map move {context.document.source} {element.link} {by}" if off else ""
         if off and len(context.map.subtree(element.link)) > 1:
             hint += "; what hangs on it moves along, but with --leave-children"
         detail = {
@@ -154,7 +155,7 @@ def a004_drift(context: Context) -> Iterator[Problem]:
     if abs(scale) > _SURE * sd[3] and abs(scale) >= 0.002:
         size = "small" if scale > 0 else "large"
         words.append(f"{abs(scale) * 100:.2f} +- {sd[3] * 100:.2f} % too {size}")
-        hints.append(f"wallkit map scale FILE {1 + scale:.5f}")
+        hints.append(f"wallkit map scale {context.document.source} {1 + scale:.5f}")
     if math.isfinite(sd[0]):
         if abs(yaw) > _SURE * sd[2] and abs(yaw) >= math.radians(0.2):
             words.append(f"turned by {-math.degrees(yaw):.2f} +- {math.degrees(sd[2]):.2f} deg")
@@ -162,9 +163,9 @@ def a004_drift(context: Context) -> Iterator[Problem]:
             words.append(f"off by x {-x:.3f}, y {-y:.3f} m (+- {max(sd[0], sd[1]):.3f})")
         if len(words) > len(hints):
             to = ",".join(f"{value:.5g}" for value in invert([x, y, yaw]))
-            hints.append(f"wallkit map origin FILE --to {to}")
+            hints.append(f"wallkit map origin {context.document.source} --to {to}")
     message = f"the map as a whole is {', '.join(words) or 'not where the log has it'}"
-    hint = "; ".join(hints) + "; the other findings are told as if that were done"
+    hint = "; ".join([*hints, "the other findings are told as if that were done"])
     detail = {"x_m": x, "y_m": y, "yaw_rad": yaw, "scale": 1 + scale, "sd": sd}
     yield Problem(context.map.header.element or context.root, message, hint, detail=detail)
 

@@ -107,6 +107,9 @@ def run(
                 continue
             if rule.needs_log and context.evidence is None:
                 continue
+            # nobody wants to know, and nothing waits for it
+            if rule.code not in selected and not rule.blocks:
+                continue
             if reason is not None:
                 skipped.append(Skipped(rule.code, f"{reason.code} at {reason.line}:{reason.column}"))
                 continue
