@@ -35,3 +35,13 @@ def wallkit(tmp_path):
         return Done(done.returncode, done.stdout, done.stderr)
 
     return run
+
+
+@pytest.fixture(scope="session")
+def board_log(tmp_path_factory) -> Path:
+    """42 seconds of a board held before camera and LiDAR at 14 places."""
+    from tests.e2e.board_log import stations, write_log
+
+    path = tmp_path_factory.mktemp("calib") / "log.mcap"
+    write_log(path, stations())
+    return path

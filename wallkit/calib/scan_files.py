@@ -21,11 +21,12 @@ _FLAT_M = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class ScanFile:
-    """Points (K, 3) of one file in the LiDAR frame [m], with their rings where it has them."""
+    """Points (K, 3) of one file in the LiDAR frame [m], with their rings and intensities where it has them."""
 
     name: str
     points_m: Float64Array
     rings: Int64Array | None = None
+    intensities: Float64Array | None = None
 
     @property
     def is_planar(self) -> bool:
@@ -75,7 +76,13 @@ def read_scan(path: Path) -> ScanFile:
     seen = np.isfinite(points).all(axis=1) & (np.linalg.norm(points, axis=1) > 1e-3)
     if not seen.any():
         raise CalibrationError(f"the scan is empty: none of its {len(points)} points is a return", where=path)
-    return ScanFile(path.name, points[seen], None if rings is None else np.asarray(rings, np.int64)[seen])
+    intensities = columns.get("intensity")
+    return ScanFile(
+        path.name,
+        points[seen],
+        None if rings is None else np.asarray(rings, np.int64)[seen],
+        None if intensities is None else np.asarray(intensities, np.float64)[seen],
+    )
 
 
 def paired(pictures: Sequence[str], scans: Sequence[str], *, tolerance_s: float = 0.1) -> list[tuple[int, int]]:
@@ -124,7 +131,8 @@ def _npz(path: Path) -> dict[str, Float64Array]:
         if "points" in arrays:
             points = np.asarray(arrays["points"], dtype=np.float64)
             columns = dict(zip("xyz", points.T, strict=False))
-            return {**columns, **({"ring": arrays["rings"]} if "rings" in arrays else {})}
+            more = {"ring": "rings", "intensity": "intensities"}
+            return {**columns, **{name: arrays[key] for name, key in more.items() if key in arrays}}
         if "ranges" not in arrays:
             raise ValueError(f"it has {', '.join(arrays.files)}, neither points nor ranges")
         ranges = np.asarray(arrays["ranges"], dtype=np.float64)

@@ -8,7 +8,9 @@ from wallkit.cli.calib_board import board
 from wallkit.cli.calib_convert import convert
 from wallkit.cli.calib_extrinsics import extrinsics
 from wallkit.cli.calib_intrinsics import intrinsics
+from wallkit.cli.calib_overlay import overlay
 from wallkit.cli.calib_urdf import from_urdf, to_urdf
+from wallkit.cli.calib_verify import verify
 
 
 @click.group()
@@ -16,5 +18,5 @@ def calib() -> None:
     """Calibrate cameras and the place of a LiDAR to them, and say how far the result may be trusted."""
 
 
-for command in (board, intrinsics, extrinsics, from_urdf, to_urdf, convert):
+for command in (board, intrinsics, extrinsics, verify, overlay, from_urdf, to_urdf, convert):
     calib.add_command(command)

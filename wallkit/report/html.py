@@ -43,7 +43,7 @@ def report_html(data: ReportData) -> str:
     shown_doubts, left_out = doubts(data.steps)
     headline = [data.metrics[key] for key in data.headline if key in data.metrics]
     others = [value for key, value in data.metrics.items() if key not in data.headline]
-    return _rendered(
+    return rendered(
         "report.html",
         data=data,
         headline=headline,
@@ -60,7 +60,7 @@ def report_html(data: ReportData) -> str:
 
 def compare_html(data: CompareData) -> str:
     """The page of several runs side by side."""
-    return _rendered(
+    return rendered(
         "compare.html",
         data=data,
         rows=compare_rows(data),
@@ -69,7 +69,8 @@ def compare_html(data: CompareData) -> str:
     )
 
 
-def _rendered(template: str, **values: Any) -> str:
+def rendered(template: str, **values: Any) -> str:
+    """A page of this room's templates; everything in `values` is escaped."""
     import jinja2
 
     environment = jinja2.Environment(
