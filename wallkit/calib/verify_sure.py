@@ -86,7 +86,9 @@ def pixel_gate(evidence: Evidence, limits: VerifyLimits) -> Gate:
     scale = evidence.calibration.camera.width / limits.pixel_width
     good = round(limits.pixel_px * scale, 2)
     value = pixel_error_at(evidence, limits.reference_m)
-    reason = f"the transform is not known well enough: {value:.1f} px at {limits.reference_m:g} m, {good:g} px may be"
+    reason = (
+        f"the transform is not known well enough: {value:.1f} px at {limits.reference_m:g} m, {good:g} px are allowed"
+    )
     if not np.isfinite(value):
         reason = "the covariance is not known, or the LiDAR sees nothing of the image"
     basis = f"covariance {evidence.covariance_source}, carried to pixels"

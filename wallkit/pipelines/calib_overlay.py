@@ -96,5 +96,5 @@ def picture_of(calibration: Calibration, frame: LookFrame, *, title: str = "") -
         )
     projection = project(calibration, frame.points_m, allow_unverified=True)
     ranges = np.linalg.norm(frame.points_m, axis=1)
-    words = title or f"range from the LiDAR; {frame.name}, {int(projection.is_inside.sum())} points"
+    words = title or f"{frame.name}, {int(projection.is_inside.sum())} points"
     return draw_points(frame.pixels, projection, ranges, title=words), int(projection.is_inside.sum())
