@@ -88,7 +88,7 @@ def _error(camera: Camera, T: Float64Array, points: Float64Array, pixels: Float6
 def _slope(camera: Camera, T: Float64Array, points: Float64Array) -> Float64Array:
     """(2n, 6) d pixels / d (w, dt), R <- Exp(w) R, t <- t + dt."""
     arms = points @ T[:3, :3].T
-    by_motion = np.concatenate([-np.array([skew(a) for a in arms]), np.tile(np.eye(3), (len(arms), 1, 1))], axis=2)
+    by_motion = np.concatenate([-skew(arms), np.tile(np.eye(3), (len(arms), 1, 1))], axis=2)
     return np.asarray((camera.point_jacobian(arms + T[:3, 3]) @ by_motion).reshape(-1, 6))
 
 

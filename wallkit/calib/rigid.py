@@ -20,9 +20,19 @@ def vector_from_rotation(R: ArrayLike) -> Float64Array:
 
 
 def skew(v: ArrayLike) -> Float64Array:
-    """(3, 3) [v]x, so that [v]x u = v x u."""
-    x, y, z = np.asarray(v, dtype=np.float64)
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    """(..., 3, 3) [v]x of v (..., 3), so that [v]x u = v x u."""
+    v = np.asarray(v, dtype=np.float64)
+    K = np.zeros((*v.shape, 3))
+    for row, column, axis, sign in (
+        (0, 1, 2, -1),
+        (0, 2, 1, 1),
+        (1, 0, 2, 1),
+        (1, 2, 0, -1),
+        (2, 0, 1, -1),
+        (2, 1, 0, 1),
+    ):
+        K[..., row, column] = sign * v[..., axis]
+    return K
 
 
 def left_jacobian(w: ArrayLike) -> Float64Array:

@@ -19,6 +19,8 @@ NEAR_PLANE_M = 0.25
 LINE_M = 0.02
 _YAWS = 24
 _ROUNDS = 4
+# headings are tried on so many of the scans
+_TRIED = 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,19 +138,20 @@ def traces_without_guess(
     Returns:
         A trace a scan, and (4, 4) T_camera_lidar; None where no heading finds three boards.
     """
-    best: tuple[float, list[Trace], Float64Array | None] = (
-        -np.inf,
-        [_none("no heading of the LiDAR finds it")] * len(returns),
-        None,
-    )
+    few = np.unique(np.linspace(0, len(returns) - 1, min(_TRIED, len(returns))).astype(int))
+    some, theirs = [returns[i] for i in few], [boards[i] for i in few]
+    best: tuple[float, Float64Array | None] = (-np.inf, None)
     for flip in (0.0, np.pi):
         for yaw in np.arange(_YAWS) * 2 * np.pi / _YAWS:
             T = np.eye(4)
             T[:3, :3] = UPRIGHT @ rotation_from_vector([flip, 0.0, 0.0]) @ rotation_from_vector([0.0, 0.0, yaw])
-            scored = _tried(returns, boards, plate_corners, T, sigma_range_m, plate_is_known)
-            if scored[0] > best[0] + 1e-9:
-                best = scored
-    return best[1], best[2]
+            score, _, found = _tried(some, theirs, plate_corners, T, sigma_range_m, plate_is_known)
+            if score > best[0] + 1e-9:
+                best = score, found
+    if best[1] is None:
+        return [_none("no heading of the LiDAR finds it")] * len(returns), None
+    _, traces, T_found = _tried(returns, boards, plate_corners, best[1], sigma_range_m, plate_is_known)
+    return traces, T_found
 
 
 # ------------------------------------------------------------------------------------------------ details

@@ -114,7 +114,7 @@ def pose_covariance(world: World, T_camera_board: Float64Array) -> Float64Array:
     z = seen[:, 2]
     zero = np.zeros_like(z)
     by_point = np.stack([[1 / z, zero, -seen[:, 0] / z**2], [zero, 1 / z, -seen[:, 1] / z**2]]).transpose(2, 0, 1)
-    by_motion = np.concatenate([-np.array([skew(p) for p in grid]), np.tile(np.eye(3), (len(grid), 1, 1))], axis=2)
+    by_motion = np.concatenate([-skew(grid), np.tile(np.eye(3), (len(grid), 1, 1))], axis=2)
     rows = (world.focal_px * by_point @ by_motion).reshape(-1, 6)
     return np.linalg.inv(rows.T @ rows) * world.sigma_px**2
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from wallkit.calib.board_pose import AMBIGUOUS, pose_of_board
-from wallkit.calib.detect import find_corners
+from wallkit.calib.detect import find_quickly
 from wallkit.calib.scan_board import find_trace, returns_of
 from wallkit.calib.sightings import BoardPose
 from wallkit.calib.time_offset import BoardTrack, TimedTrace, TimeOffset, time_offset
@@ -65,7 +65,7 @@ def _track(log: Log, topic: str, gathered: Gathered, windows: list[tuple[int, in
         image = message.value
         if not isinstance(image, CameraImage) or not any(b <= message.stamp_ns <= e for b, e in windows):
             continue
-        corners = find_corners(grey_of(image), gathered.board)
+        corners = find_quickly(grey_of(image), gathered.board, is_thorough=True)
         if corners is None:
             continue
         pose = pose_of_board(gathered.camera, gathered.board.object_points[corners.ids], corners.pixels)

@@ -14,7 +14,7 @@ import numpy as np
 
 from wallkit.calib.board_pose import AMBIGUOUS, pose_of_board
 from wallkit.calib.boards import Board
-from wallkit.calib.detect import find_corners, find_roughly
+from wallkit.calib.detect import find_quickly
 from wallkit.calib.scan_board import returns_of
 from wallkit.calib.sightings import BoardPose
 from wallkit.calib.store import read_calibration
@@ -31,6 +31,7 @@ STILL_M_PER_S = 0.02
 TOLERANCE_S = 0.1
 MOST_VIEWS = 60
 _FEWEST_STILL = 5
+_THOROUGH = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +106,7 @@ def _moments(
 ) -> tuple[list[_Moment], int, list[LeftOut]]:
     moments: list[_Moment] = []
     left_out: list[LeftOut] = []
-    next_ns, looked_at = 0, 0
+    next_ns, looked_at, was_there = 0, 0, False
     for message in log.messages([topic]):
         if message.stamp_ns < next_ns or not isinstance(message.value, CameraImage):
             continue
@@ -118,9 +119,9 @@ def _moments(
             raise CalibrationError(
                 f"images of {topic} have {sizes}", where=log.name, hint="give --camera of this camera and mode"
             )
-        if find_roughly(grey, board, width=640) is None:
-            continue
-        corners = find_corners(grey, board)
+        # a board that was there half a second ago is looked for well; else now and then
+        corners = find_quickly(grey, board, is_thorough=was_there or looked_at % _THOROUGH == 1)
+        was_there = corners is not None
         if corners is None:
             continue
         name = f"{message.stamp_ns / 1e9:.3f}"
