@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import cv2
 import numpy as np
 
 from wallkit.calib.boards import Board
 from wallkit.calib.bundle import rotations
-from wallkit.calib.sheet import sheet_of
+from wallkit.calib.sheet import FOOT_MM, sheet_of
 from wallkit.calib.views import Capture, View
 from wallkit.core.camera import Camera
 
@@ -17,6 +19,7 @@ DISTORTIONS = {
     "rational_polynomial": [0.4, -0.1, 0.001, -0.0008, 0.01, 0.7, -0.05, 0.02],
     "equidistant": [-0.04, 0.012, -0.008, 0.002],
 }
+_PER_MM = 8
 BOARD = Board("chessboard", 9, 6, 0.03)
 
 
@@ -64,25 +67,72 @@ def capture_of(
 def picture(pose: np.ndarray, *, cam: Camera | None = None, board: Board = BOARD, blur_px: float = 0.8) -> np.ndarray:
     """(H, W) uint8: every pixel's ray cut with the board's plane and looked up on the sheet, over a grey wall."""
     cam = cam or camera()
-    per_mm = 8
-    sheet = sheet_of(board)
-    page = np.full((round(sheet.height_mm * per_mm), round(sheet.width_mm * per_mm)), 235, np.uint8)
-    for x, y, w, h in np.round(sheet.rectangles * per_mm).astype(int):
-        page[y : y + h, x : x + w] = 20
-    # remap looks up single pixels: the page is as blurred as a camera pixel is wide
-    page = cv2.GaussianBlur(page, (0, 0), 3.0)
-    # where the board's origin lies on the page
-    first = sheet.rectangles[0, :2] if board.kind == "chessboard" else None
-    assert first is not None
-    origin = first + board.square_m * 1e3
-    rays = cam.unproject(np.stack(np.meshgrid(np.arange(cam.width), np.arange(cam.height)), -1))
+    page, origin = _page(board)
+    rays = _rays(cam.model, cam.width, cam.height, tuple(cam.parameters.tolist()))
     normal, offset = pose[:3, 2], pose[:3, 2] @ pose[:3, 3]
     with np.errstate(all="ignore"):
         on_plane = rays * (offset / (rays @ normal))[..., None]
     on_board = (on_plane - pose[:3, 3]) @ pose[:3, :3]
-    where = ((on_board[..., :2] * 1e3 + origin) * per_mm - 0.5).astype(np.float32)
+    where = ((on_board[..., :2] * 1e3 + origin) * _PER_MM - 0.5).astype(np.float32)
     where = np.nan_to_num(where, nan=-1e6)
     image = cv2.remap(
         page, where[..., 0], where[..., 1], cv2.INTER_AREA, borderMode=cv2.BORDER_CONSTANT, borderValue=120
     )
     return cv2.GaussianBlur(image, (0, 0), blur_px)
+
+
+@cache
+def _page(board: Board) -> tuple[np.ndarray, np.ndarray]:
+    """The printed sheet, _PER_MM pixels a millimetre, and where the board's origin lies on it [mm]."""
+    sheet = sheet_of(board)
+    page = np.full((round(sheet.height_mm * _PER_MM), round(sheet.width_mm * _PER_MM)), 235, np.uint8)
+    for x, y, w, h in np.round(sheet.rectangles * _PER_MM).astype(int):
+        page[y : y + h, x : x + w] = 20
+    size, (low, _) = board.pattern_size_m * 1e3, board.pattern_box
+    corner = np.array([sheet.width_mm - size[0], sheet.height_mm - FOOT_MM - size[1]]) / 2
+    # remap looks up single pixels: the page is as blurred as a camera pixel is wide
+    return cv2.GaussianBlur(page, (0, 0), 3.0), corner - low * 1e3
+
+
+@cache
+def _rays(model: str, width: int, height: int, parameters: tuple[float, ...]) -> np.ndarray:
+    """(H, W, 3) rays of every pixel."""
+    fx, fy, cx, cy, *D = parameters
+    cam = Camera(model, width, height, np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]), np.array(D))
+    return cam.unproject(np.stack(np.meshgrid(np.arange(width), np.arange(height)), -1))
+
+
+def sweep_poses(rng: np.random.Generator, count: int, board: Board = BOARD, *, cam: Camera | None = None) -> np.ndarray:
+    """(count, 4, 4) T_camera_board as a careful person shows a board: to the middle, edges and corners of the image in turn,
+    near and far, upright and tilted by up to 40 deg.
+
+    A chessboard is as near to the image's edge as its outer squares let it be; a board with markers may be half outside.
+    """
+    cam = cam or camera()
+    low, high = board.pattern_box
+    around = np.array([(low[0], low[1], 0), (high[0], low[1], 0), (high[0], high[1], 0), (low[0], high[1], 0)])
+    middle = around.mean(axis=0)
+    if board.kind == "charuco":
+        around = middle + (around - middle) * 0.5
+    aims = [(u, v) for v in (-1, 0, 1) for u in (-1, 0, 1)]
+    poses: list[np.ndarray] = []
+    while len(poses) < count:
+        aim = np.array(aims[len(poses) % 9])
+        pose = np.eye(4)
+        pose[:3, :3] = rotations(rng.uniform([-0.7, -0.7, -0.3], [0.7, 0.7, 0.3])[None])[0]
+        width = float(high[0] - low[0]) * cam.K[0, 0] / cam.width
+        distance = width / rng.uniform(0.3, 0.6)
+        # from the middle outwards until it would leave the image
+        for share in np.linspace(0, 1.2, 61):
+            there = np.append(aim * share * 0.5 * (cam.width, cam.height) / cam.K[[0, 1], [0, 1]], 1) * distance
+            tried = pose.copy()
+            tried[:3, 3] = there - pose[:3, :3] @ middle
+            pixels = cam.project(around @ tried[:3, :3].T + tried[:3, 3])
+            if not (cam.is_inside(pixels) & cam.is_inside(pixels + 3) & cam.is_inside(pixels - 3)).all():
+                break
+            best = tried
+        else:
+            best = tried
+        if share > 0:
+            poses.append(best)
+    return np.stack(poses)

@@ -17,7 +17,7 @@ from wallkit.core.camera import Camera
 from wallkit.core.types import BoolArray, Float64Array
 
 MAX_ITERATIONS = 500
-_RELATIVE_DROP = 1e-14
+LEAST_DROP = 1e-14
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +52,7 @@ def adjust(
     free: BoolArray,
     huber_px: float = np.inf,
     max_iterations: int = MAX_ITERATIONS,
+    least_drop: float = LEAST_DROP,
 ) -> Fit:
     """The nearest optimum of camera and poses.
 
@@ -59,6 +60,7 @@ def adjust(
         start: camera and poses to begin with.
         free: (4 + n,) which of fx, fy, cx, cy, D may change; none: only the poses do.
         huber_px: distance from which a corner pulls with constant force (Huber); inf: least squares.
+        least_drop: of the cost in a step, relative; below it the optimum is reached.
 
     Returns:
         A Fit; `is_converged` is False when it was still improving after the last iteration.
@@ -76,7 +78,7 @@ def adjust(
                 return replace(fit, iterations=iteration, is_converged=True)
         drop = fit.cost - tried.cost
         fit, damping = tried, max(damping / 10, 1e-12)
-        if drop <= _RELATIVE_DROP * fit.cost or fit.cost < 1e-20:
+        if drop <= least_drop * fit.cost or fit.cost < 1e-20:
             return replace(fit, iterations=iteration, is_converged=True)
     return replace(fit, iterations=max_iterations, is_converged=False)
 
@@ -113,19 +115,16 @@ class System:
 def normal_equations(fit: Fit, seen: Observations, free: BoolArray) -> System:
     """The weighted normal equations at a fit, for its next step or its covariance."""
     by_camera, by_pose = jacobians(fit.camera, fit.poses, seen)
-    by_camera, starts, w = by_camera[:, :, free], seen.starts, fit.weights[:, None, None]
-
-    def summed(a: Float64Array, b: Float64Array) -> Float64Array:
-        return np.add.reduceat(np.swapaxes(a * w, 1, 2) @ b, starts, axis=0)
-
-    e = fit.residuals[:, :, None]
-    return System(
-        summed(by_camera, by_camera),
-        summed(by_pose, by_pose),
-        summed(by_camera, by_pose),
-        summed(by_camera, e)[:, :, 0],
-        summed(by_pose, e)[:, :, 0],
-    )
+    every = np.concatenate([by_camera[:, :, free], by_pose, fit.residuals[:, :, None]], axis=2)
+    every *= np.sqrt(fit.weights)[:, None, None]
+    # views side by side, the shorter ones filled up with zeros: one product for all
+    within = np.arange(len(seen.views)) - seen.starts[seen.views]
+    padded = np.zeros((seen.count, int(within.max()) + 1, *every.shape[1:]))
+    padded[seen.views, within] = every
+    padded = padded.reshape(seen.count, -1, every.shape[2])
+    squared = np.swapaxes(padded, 1, 2) @ padded
+    c, v = slice(0, -7), slice(-7, -1)
+    return System(squared[:, c, c], squared[:, v, v], squared[:, c, v], squared[:, c, -1], squared[:, v, -1])
 
 
 def jacobians(camera: Camera, poses: Float64Array, seen: Observations) -> tuple[Float64Array, Float64Array]:

@@ -1,35 +1,44 @@
-"""Normal equations of a camera -> how uncertain its parameters are, with the views as the units that err."""
+"""A camera fitted to several views -> how uncertain its parameters are, with the views as the units that err."""
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
-from wallkit.calib.bundle import Fit, System
+from wallkit.calib.bundle import Fit, System, jacobians
+from wallkit.calib.covariance import Spread, spread_of
+from wallkit.calib.views import Observations
 from wallkit.core.types import BoolArray, Float64Array
 
+# stands for infinity where the views leave a parameter open: its square can still be stored
+_OPEN = 1e150
 
-def clustered_covariance(system: System, free: BoolArray) -> Float64Array:
-    """(4 + n, 4 + n) covariance in which all corners of a view may err together; zero where a parameter is held.
 
-    The one-step jackknife over views (CR3; MacKinnon & White 1985, Bell & McCaffrey 2002): each view is left out, the camera
-    moves by d_g = (S - S_g)^-1 s_g, and C = (G - 1)/G sum d_g d_g'. S is the camera's information after the poses are
-    eliminated, s_g the score of view g. Unlike the plain sandwich it is not too small with few views. Where leaving out one
-    view makes the camera undetermined, its variance is infinite: the largest float that can be stored stands for it.
+def camera_spread(fit: Fit, seen: Observations, free: BoolArray, sigma_px: float) -> Spread:
+    """Uncertainty of the 4 + n parameters in which all corners of a view may err together; zero where one is held.
+
+    Each view's Jacobian is first cleared of what its own board pose explains, then shortened to a triangle by QR: both
+    leave the information, the scores and the leverages of `spread_of` as they are.
+
+    Args:
+        sigma_px: standard deviation of a residual coordinate.
     """
-    schur, scores, gain = system.reduced()
-    count = len(scores)
-    # information of each view about the camera: its share of cc is not kept apart, so it is found from J'J of the view
-    each = system.cc_views - system.cv @ gain
-    changes = np.empty_like(scores)
-    for g in range(count):
-        rest = schur - each[g]
-        scale = np.sqrt(np.maximum(np.diag(schur), 1e-300))
-        balanced = rest / np.outer(scale, scale)
-        if np.linalg.cond(balanced) > 1e14:
-            changes[g] = 1e150
-            continue
-        changes[g] = np.linalg.solve(balanced, scores[g] / scale) / scale
-    return _whole((count - 1) / count * changes.T @ changes, free)
+    rows, residuals = _reduced_rows(fit, seen, free, max(sigma_px, 1e-9))
+    # pixels against coefficients: comparable columns keep the inverse exact
+    scale = np.sqrt((rows**2).sum(axis=(0, 1)))
+    unknowns, every = int(free.sum()), len(free)
+    if not (scale > 0).all():
+        return _open(free, seen.count)
+    try:
+        spread = spread_of(rows / scale, residuals)
+    except np.linalg.LinAlgError:
+        return _open(free, seen.count)
+    degrees = np.full(every, np.inf)
+    degrees[free] = spread.degrees
+    both = np.outer(scale, scale)
+    assert spread.covariance.shape == (unknowns, unknowns)
+    return Spread(_whole(spread.covariance / both, free), _whole(spread.predicted / both, free), degrees, seen.count)
 
 
 def naive_covariance(system: System, fit: Fit, free: BoolArray) -> Float64Array:
@@ -38,6 +47,35 @@ def naive_covariance(system: System, fit: Fit, free: BoolArray) -> Float64Array:
     degrees = 2 * len(fit.residuals) - int(free.sum()) - 6 * len(scores)
     variance = float((fit.weights[:, None] * fit.residuals**2).sum()) / max(1, degrees)
     return _whole(np.asarray(variance * np.linalg.inv(schur)), free)
+
+
+def _reduced_rows(fit: Fit, seen: Observations, free: BoolArray, sigma_px: float) -> tuple[Float64Array, Float64Array]:
+    """Whitened Jacobian (G, p, p) and residuals (G, p) of each view, its pose eliminated."""
+    by_camera, by_pose = jacobians(fit.camera, fit.poses, seen)
+    root = np.sqrt(fit.weights)[:, None] / sigma_px
+    by_camera, by_pose, errors = (
+        by_camera[:, :, free] * root[..., None],
+        by_pose * root[..., None],
+        fit.residuals * root,
+    )
+    unknowns = int(free.sum())
+    rows, residuals = np.zeros((seen.count, unknowns, unknowns)), np.zeros((seen.count, unknowns))
+    bounds = [*seen.starts.tolist(), len(errors)]
+    for view, (a, b) in enumerate(itertools.pairwise(bounds)):
+        pose, _ = np.linalg.qr(by_pose[a:b].reshape(-1, 6))
+        camera, error = by_camera[a:b].reshape(-1, unknowns), errors[a:b].ravel()
+        basis, triangle = np.linalg.qr(camera - pose @ (pose.T @ camera))
+        rows[view, : len(triangle)], residuals[view, : len(triangle)] = (
+            triangle,
+            basis.T @ (error - pose @ (pose.T @ error)),
+        )
+    return rows, residuals
+
+
+def _open(free: BoolArray, views: int) -> Spread:
+    """What is known when the views leave the camera undetermined: nothing."""
+    covariance = np.diag(np.where(free, _OPEN**2, 0.0))
+    return Spread(covariance, covariance, np.where(free, 1.0, np.inf), views)
 
 
 def _whole(covariance: Float64Array, free: BoolArray) -> Float64Array:

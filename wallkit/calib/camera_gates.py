@@ -7,68 +7,51 @@ from collections.abc import Sequence
 import numpy as np
 
 from wallkit.calib.camera_coverage import Coverage
+from wallkit.calib.camera_limits import CameraLimits
 from wallkit.calib.cross_validation import Candidate, Halves, grows_to_corner
 from wallkit.calib.gates import Gate, above, below
 from wallkit.calib.intrinsics import Intrinsics
+from wallkit.calib.projection_uncertainty import projection_sigma
+
+LIMITS = CameraLimits()
 
 
 def camera_gates(
-    found: Intrinsics, coverage: Coverage, halves: Halves | None, tried: Sequence[Candidate]
+    found: Intrinsics,
+    coverage: Coverage,
+    halves: Halves | None,
+    tried: Sequence[Candidate],
+    limits: CameraLimits = LIMITS,
 ) -> tuple[Gate, ...]:
     """Every question asked of the intrinsics, in the order of the report.
 
     Too little data is CANNOT TELL, never FAIL: more views can still turn it into a PASS.
     """
+    return (*_fit_gates(found, tried, limits), *_sure_gates(found, halves, limits), *_coverage_gates(coverage, limits))
+
+
+def _fit_gates(found: Intrinsics, tried: Sequence[Candidate], limits: CameraLimits) -> tuple[Gate, ...]:
+    """Whether the model explains what was seen."""
     own = next((c for c in tried if c.model == found.model), None)
     used = len(found.views)
-    total = used + len(found.rejected_views)
-    relative = float((found.sigmas[:2] / found.camera.parameters[:2]).max())
-    lean = "tilt the board by more than 25 deg"
     return (
         above("converged", float(found.fit.is_converged), "", good=1, bad=1, reason="the solver was still improving"),
-        above("views", used, "", good=12, reason=f"only {used} views: show the board from at least 12 sides"),
+        above("views", used, "", good=limits.views, reason=f"only {used} views: show the board from at least 12 sides"),
         below(
             "views rejected",
-            len(found.rejected_views) / total,
+            len(found.rejected_views) / (used + len(found.rejected_views)),
             "",
-            good=0.1,
-            bad=0.24,
+            good=limits.rejected,
+            bad=limits.rejected_bad,
             reason="views do not agree with the others: is the board flat, or was one moved or blurred?",
         ),
         below(
             "reprojection error, held out",
             own.held_out_rms_px if own else float("nan"),
             "px",
-            good=0.4,
-            bad=0.8,
+            good=limits.held_out_px,
+            bad=limits.held_out_bad_px,
             reason="corners are not where the model puts them: another --model, a flatter board, sharper pictures",
-        ),
-        below(
-            "sigma of the focal length",
-            100 * relative,
-            "%",
-            good=0.5,
-            reason="the views do not fix the focal length: tilt the board more, and bring it closer",
-        ),
-        _halves_gate(found, halves),
-        above(
-            "hull of the corners",
-            coverage.hull_share,
-            "of the image",
-            good=0.6,
-            reason="parts of the image saw no board: nothing is known of the lens there",
-        ),
-        above(
-            "cells with corners",
-            coverage.cell_share,
-            "of the cells",
-            good=0.6,
-            reason="move the board over the whole image",
-        ),
-        above("views tilted about x", coverage.tilted_x, "", good=3, reason=f"{lean} forwards and backwards"),
-        above("views tilted about y", coverage.tilted_y, "", good=3, reason=f"{lean} to the left and right"),
-        above(
-            "largest by smallest board", coverage.size_ratio, "", good=1.5, reason="show the board nearer and farther"
         ),
         above(
             "model sound up to the corners",
@@ -80,13 +63,69 @@ def camera_gates(
     )
 
 
-def _halves_gate(found: Intrinsics, halves: Halves | None) -> Gate:
-    """Median difference of two halves: within twice what their covariances say, and half a pixel at 1280 px of width."""
-    name, limit = "halves differ by, median", 0.5 * max(1.0, found.camera.width / 1280)
+def _sure_gates(found: Intrinsics, halves: Halves | None, limits: CameraLimits) -> tuple[Gate, ...]:
+    """How sure the result is, and whether that is honest."""
+    relative = float((found.sigmas[:2] / found.camera.parameters[:2]).max())
+    wider = max(1.0, found.camera.width / limits.pixel_width)
+    return (
+        below(
+            "sigma of the focal length",
+            100 * relative,
+            "%",
+            good=100 * limits.focal,
+            reason="the views do not fix the focal length: tilt the board more, and bring it closer",
+        ),
+        below(
+            "sigma of a pixel, median",
+            projection_sigma(found.camera, found.covariance).median,
+            "px",
+            good=limits.pixel_px * wider,
+            reason="more views, a board with more corners, or one that fills more of the image make it smaller",
+        ),
+        _halves_gate(halves, wider, limits),
+    )
+
+
+def _halves_gate(halves: Halves | None, wider: float, limits: CameraLimits) -> Gate:
+    name = "halves differ by, median"
     if halves is None:
-        return Gate(name, float("nan"), "px", f"<= {limit:g}", "CANNOT TELL", "too few views for two halves")
-    allowed = min(limit, 2 * halves.expected_px)
-    value = halves.difference.median
-    bad = np.inf if value <= 2 * halves.expected_px else 4 * limit
+        reason = "too few views for two halves"
+        return Gate(name, float("nan"), "px", f"<= {limits.halves_sigmas:g} sigma", "CANNOT TELL", reason)
+    allowed, value = limits.halves_sigmas * halves.expected_px, halves.difference.median
     reason = f"two cameras from half the views each disagree (expected {halves.expected_px:.2f} px)"
+    bad = max(allowed, limits.halves_bad_px * wider)
     return below(name, value, "px", good=float(np.round(allowed, 3)), bad=bad, reason=reason)
+
+
+def _coverage_gates(coverage: Coverage, limits: CameraLimits) -> tuple[Gate, ...]:
+    """Whether the board was where the camera looks."""
+    lean = "tilt the board by more than 25 deg"
+    return (
+        above(
+            "hull of the corners",
+            coverage.hull_share,
+            "of the image",
+            good=limits.hull,
+            reason="parts of the image saw no board: nothing is known of the lens there",
+        ),
+        above(
+            "cells with corners",
+            coverage.cell_share,
+            "of the cells",
+            good=limits.cells,
+            reason="move the board over the whole image",
+        ),
+        above(
+            "views tilted about x", coverage.tilted_x, "", good=limits.tilted, reason=f"{lean} forwards and backwards"
+        ),
+        above(
+            "views tilted about y", coverage.tilted_y, "", good=limits.tilted, reason=f"{lean} to the left and right"
+        ),
+        above(
+            "largest by smallest board",
+            coverage.size_ratio,
+            "",
+            good=limits.size_ratio,
+            reason="show the board nearer and farther",
+        ),
+    )

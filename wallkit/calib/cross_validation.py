@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wallkit.calib.bundle import Fit, normal_equations
-from wallkit.calib.camera_covariance import clustered_covariance
-from wallkit.calib.intrinsics import Intrinsics, fit_cameras, free_parameters, held_out_residuals
+from wallkit.calib.bundle import Fit
+from wallkit.calib.camera_covariance import camera_spread
+from wallkit.calib.intrinsics import Intrinsics, fit_cameras, free_parameters, held_out_residuals, robust_sigma
 from wallkit.calib.projection_uncertainty import PixelMap, projection_difference, projection_sigma
 from wallkit.calib.views import Capture, Observations
 from wallkit.core.camera import Camera
@@ -64,7 +64,7 @@ def compare_halves(found: Intrinsics, capture: Capture) -> Halves | None:
         fit = _fit_or_none(found.model, capture, half, found.camera)
         if fit is None:
             return None
-        covariance = clustered_covariance(normal_equations(fit, half, found.free), found.free)
+        covariance = camera_spread(fit, half, found.free, robust_sigma(fit)).covariance
         cameras.append(fit.camera)
         medians.append(projection_sigma(fit.camera, covariance).median)
     return Halves(projection_difference(cameras[0], cameras[1]), float(sum(medians)))

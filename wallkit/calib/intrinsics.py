@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from wallkit.calib.bundle import Fit, adjust, first_fit, homography, normal_equations
-from wallkit.calib.camera_covariance import clustered_covariance, naive_covariance
+from wallkit.calib.camera_covariance import camera_spread, naive_covariance
+from wallkit.calib.covariance import Spread
 from wallkit.calib.views import Capture, Observations, View, observations_of
 from wallkit.core.camera import Camera
 from wallkit.core.lenses import CAMERAS
@@ -18,6 +19,8 @@ from wallkit.errors import CalibrationError, closest
 _GUESSES = (0.5, 0.8, 1.2)
 _START_ITERATIONS = 50
 _ROUNDS = 3
+# models and halves are compared to a hundredth of their RMS: no need for the last digits of each
+_JUDGING_DROP = 1e-9
 _VIEW_RMS_FACTOR, _VIEW_MAD_Z, _CORNER_SIGMAS, _MOST_REJECTED = 3.0, 5.0, 5.0, 0.25
 # standard deviations of a normal distribution per median absolute deviation
 _SIGMA_PER_MAD = 1.4826
@@ -41,7 +44,7 @@ class Intrinsics:
         plain_rms_px: of the least-squares fit to every corner of every view, and plain: that fit.
         rejected_views: name -> why. rejected_corners: how many, in views that are used.
         sigma_px: robust standard deviation of a residual coordinate.
-        covariance: (4 + n, 4 + n) clustered by view; zero where a parameter is held.
+        spread: of the 4 + n parameters, clustered by view; zero where a parameter is held.
         naive_covariance: s^2 (J'J)^-1, which takes every corner's error for its own.
         starts_px: RMS that each start reached, by its name, smallest is the one continued.
     """
@@ -55,7 +58,7 @@ class Intrinsics:
     rejected_views: Mapping[str, str]
     rejected_corners: int
     sigma_px: float
-    covariance: Float64Array
+    spread: Spread
     naive_covariance: Float64Array
     starts_px: Mapping[str, float]
 
@@ -65,9 +68,14 @@ class Intrinsics:
         return self.fit.camera
 
     @property
+    def covariance(self) -> Float64Array:
+        """(4 + n, 4 + n), clustered by view."""
+        return self.spread.covariance
+
+    @property
     def sigmas(self) -> Float64Array:
         """(4 + n,) clustered standard deviation of each parameter."""
-        return np.sqrt(np.diag(self.covariance))
+        return self.spread.sigmas
 
     @property
     def view_rms_px(self) -> Float64Array:
@@ -105,7 +113,6 @@ def calibrate(capture: Capture, model: str) -> Intrinsics:
         fit, kept = _without(fit, kept, good, bad_corners)
         views = [views[i] for i in good]
     fit = adjust(fit, kept, free=free, huber_px=3 * robust_sigma(fit))
-    system = normal_equations(fit, kept, free)
     return Intrinsics(
         model,
         free,
@@ -116,8 +123,8 @@ def calibrate(capture: Capture, model: str) -> Intrinsics:
         rejected,
         corners,
         robust_sigma(fit),
-        clustered_covariance(system, free),
-        naive_covariance(system, fit, free),
+        camera_spread(fit, kept, free, robust_sigma(fit)),
+        naive_covariance(normal_equations(fit, kept, free), fit, free),
         starts,
     )
 
@@ -139,8 +146,8 @@ def fit_cameras(model: str, capture: Capture, seen: Observations, *, near: Camer
     if start is None or not np.isfinite(start.cost):
         start, _ = _best_start(model, capture, seen, free)
     else:
-        start = adjust(start, seen, free=free)
-    return adjust(start, seen, free=free, huber_px=3 * max(robust_sigma(start), 1e-6))
+        start = adjust(start, seen, free=free, least_drop=_JUDGING_DROP)
+    return adjust(start, seen, free=free, huber_px=3 * max(robust_sigma(start), 1e-6), least_drop=_JUDGING_DROP)
 
 
 def held_out_residuals(camera: Camera, seen: Observations) -> Float64Array | None:
@@ -148,7 +155,9 @@ def held_out_residuals(camera: Camera, seen: Observations) -> Float64Array | Non
     start = first_fit(camera, seen)
     if start is None:
         return None
-    return adjust(start, seen, free=np.zeros(4 + len(camera.D), dtype=bool), max_iterations=100).residuals
+    return adjust(
+        start, seen, free=np.zeros(4 + len(camera.D), dtype=bool), max_iterations=100, least_drop=_JUDGING_DROP
+    ).residuals
 
 
 def robust_sigma(fit: Fit) -> float:

@@ -13,7 +13,7 @@ from wallkit.errors import CalibrationError, closest
 
 # ISO 216, portrait [mm]
 PAPERS = {"A4": (210, 297), "A3": (297, 420), "A2": (420, 594), "A1": (594, 841), "A0": (841, 1189)}
-_MARGIN_MM, _FOOT_MM = 8.0, 24.0
+_MARGIN_MM, FOOT_MM = 8.0, 24.0
 _TEXT_MM = 3.2
 # width of a letter of Helvetica, on average, as a share of its height
 _LETTER = 0.56
@@ -43,9 +43,9 @@ def sheet_of(board: Board, *, paper: str = "") -> Sheet:
     size = board.pattern_size_m * 1e3
     # detection needs white around the black squares: half a square, a quarter of a tag
     quiet = max(_MARGIN_MM, board.square_m * 1e3 * (0.5 if board.kind == "chessboard" else 0.25))
-    needed = size + 2 * quiet + (0, _FOOT_MM)
+    needed = size + 2 * quiet + (0, FOOT_MM)
     width, height = _page(needed, paper)
-    corner = np.array([(width - size[0]) / 2, (height - _FOOT_MM - size[1]) / 2])
+    corner = np.array([(width - size[0]) / 2, (height - FOOT_MM - size[1]) / 2])
     low, _ = board.pattern_box
     black = _black_rectangles(board) * 1e3
     black[:, :2] += corner - low * 1e3
@@ -71,7 +71,7 @@ def _page(needed: Float64Array, paper: str) -> tuple[float, float]:
 def _foot(board: Board, width: float, height: float) -> tuple[Float64Array, tuple[tuple[float, float, str], ...]]:
     """The scale bar with its ticks, and what stands below it."""
     length = 100.0 if width >= 120 else 50.0
-    x, y = _MARGIN_MM, height - _FOOT_MM + 6
+    x, y = _MARGIN_MM, height - FOOT_MM + 6
     bar = np.array([(x, y, length, 0.4), (x, y - 2, 0.3, 4), (x + length - 0.3, y - 2, 0.3, 4)])
     words = f"{length:.0f} mm from edge to edge: measure it after printing; scale the lengths below by what you find."
     table = "  ".join(board.toml().splitlines()[1:])

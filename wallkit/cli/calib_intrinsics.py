@@ -126,12 +126,17 @@ def _lines(result: CameraResult) -> list[str]:
     if found.rejected_corners:
         lines.append(f"rejected {found.rejected_corners} corners farther than 5 sigma")
     rows = [
-        [name, f"{value:.4f}", f"{sigma:.4f}" if free else "held"]
-        for name, value, sigma, free in zip(
-            camera.parameter_names, camera.parameters, found.sigmas, found.free, strict=True
+        [name, f"{value:.4f}", f"{sigma:.4f}" if free else "held", f"+- {half:.4f}" if free else ""]
+        for name, value, sigma, half, free in zip(
+            camera.parameter_names,
+            camera.parameters,
+            found.sigmas,
+            found.spread.half_widths(),
+            found.free,
+            strict=True,
         )
     ]
-    lines += ["", *common.table(["", "value", "sigma"], rows, right=(1, 2)).splitlines(), ""]
+    lines += ["", *common.table(["", "value", "sigma", "95 %"], rows, right=(1, 2, 3)).splitlines(), ""]
     lines.append(f"fit      {found.fit.rms_px:.4f} px RMS over corners (fit, not quality); sigma is clustered by view")
     far = result.sigma_far
     lines.append(

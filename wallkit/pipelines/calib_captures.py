@@ -4,18 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from wallkit.calib.boards import Board
-from wallkit.calib.capture import (
-    SUFFIXES,
-    Picture,
-    capture_from_pictures,
-    grey_from_bytes,
-    pictures_of_files,
-)
+from wallkit.calib.capture import SUFFIXES, capture_from_pictures, grey_from_bytes, pictures_of_files
+from wallkit.calib.frames import Picture
 from wallkit.calib.views import Capture, capture_from_npz
 from wallkit.core.types import CameraImage, UInt8Array
 from wallkit.errors import LogError
@@ -54,7 +50,7 @@ def capture_from(request: CaptureRequest, progress: Callable[[int], None] = lamb
     if is_pictures(request.inputs):
         files = pictures_of_files(request.inputs)
         return capture_from_pictures(
-            lambda: files, request.board, len(files), half_window=request.half_window, progress=progress
+            files, request.board, len(files), half_window=request.half_window, progress=progress
         )
     log = open_log(request.inputs)
     channel = pick_image(log, request.topic or None)
@@ -62,9 +58,9 @@ def capture_from(request: CaptureRequest, progress: Callable[[int], None] = lamb
         raise LogError("holds no images", where=log.name, hint="`wallkit log info` lists what it holds")
     topic = channel.topic
     frame = next((m.value.frame_id for m in log.first(topic) if isinstance(m.value, CameraImage)), "")
-    count = sum(1 for _ in log.raw([topic]))
+    count = channel.count if channel.count is not None else sum(1 for _ in log.raw([topic]))
     found = capture_from_pictures(
-        lambda: pictures_of_log(log, topic), request.board, count, half_window=request.half_window, progress=progress
+        pictures_of_log(log, topic), request.board, count, half_window=request.half_window, progress=progress
     )
     return replace(found, camera_name=topic.strip("/").split("/")[0], frame=frame)
 
@@ -85,12 +81,10 @@ def pictures_of_log(log: Log, topic: str) -> Iterator[Picture]:
 
 
 def _reader(image: CameraImage) -> Callable[[int], UInt8Array]:
-    def grey(shrink: int) -> UInt8Array:
-        if image.encoding.lower() in COMPRESSED:
-            return grey_from_bytes(image.data, f"image at {image.stamp_ns / 1e9:.3f} s", shrink)
-        return _shrunk(_grey(pixels_from_image(image)), shrink)
-
-    return grey
+    if image.encoding.lower() in COMPRESSED:
+        return lambda shrink: grey_from_bytes(image.data, f"image at {image.stamp_ns / 1e9:.3f} s", shrink)
+    whole = cache(lambda: _grey(pixels_from_image(image)))
+    return lambda shrink: _shrunk(whole(), shrink)
 
 
 def _grey(pixels: UInt8Array) -> UInt8Array:

@@ -143,6 +143,8 @@ def document(result: CameraResult) -> dict[str, Any]:
             **dict(zip(names, values, strict=True)),
         },
         "sigma": dict(zip(names, found.sigmas.tolist(), strict=True)),
+        "interval_95": dict(zip(names, found.spread.half_widths().tolist(), strict=True)),
+        "degrees_of_freedom": dict(zip(names, found.spread.degrees.tolist(), strict=True)),
         "sigma_unclustered": dict(zip(names, np.sqrt(np.diag(found.naive_covariance)).tolist(), strict=True)),
         "definition": DEFINITION,
         "fit_not_quality": reprojection_errors(found.fit.residuals, found.seen.views),
