@@ -47,6 +47,10 @@ class SimulationError(WallkitError):
     """A world, robot or scenario that cannot be simulated."""
 
 
+class DatasetError(WallkitError):
+    """A training set that cannot be made or read."""
+
+
 class ConfigError(WallkitError):
     """A setting that does not exist or has an impossible value."""
 

@@ -1,0 +1,1 @@
+"""Pictures, masks and poses -> training sets that trainers read: YOLO-seg, COCO, label PNGs, and what is in them."""
