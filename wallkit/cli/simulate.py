@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from wallkit.cli import common
+from wallkit.cli.simulate_dataset import dataset
 
 if TYPE_CHECKING:
     from wallkit.pipelines.simulate_log import LogRequest, Simulated
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 @click.group()
 def simulate() -> None:
-    """Make logs with exact truth from a semantic map: LiDAR, cameras, odometry, people and doors.
+    """Make logs with exact truth from a semantic map, and pictures with labels to train on.
 
     Needs MuJoCo: pip install 'wallkit[sim]'. Pictures need OpenGL; `wallkit doctor` says whether it works.
     """
@@ -129,3 +130,6 @@ def _lines(out: Path, done: Simulated) -> list[str]:
         f"truth    {out / 'truth.tum'}",
         f"try      wallkit localize {out / 'log.mcap'} --map {out / 'map.wkmap.urdf'}",
     ]
+
+
+simulate.add_command(dataset)

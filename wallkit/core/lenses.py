@@ -128,6 +128,9 @@ def _brown_reach(points: Float64Array) -> Float64Array:
 
 def _undistort_brown(distorted: Float64Array, D: Float64Array) -> Float64Array:
     """Newton on both coordinates, started where the radial part alone would put the point."""
+    if not D.any():
+        straight = np.concatenate([distorted, np.ones((len(distorted), 1))], -1)
+        return np.asarray(straight / np.linalg.norm(straight, axis=-1, keepdims=True))
     limit = _brown_limit(D)
     radii = np.tan(np.linspace(0, min(np.arctan(limit), _WIDEST_RAD), _TABLE))
     top, bottom = _radial(radii[:-1] ** 2, D)

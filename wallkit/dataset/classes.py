@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +48,7 @@ class LabelSet:
     """
 
     names: tuple[str, ...] = tuple(_COLOURS)
-    of: Mapping[str, str] = _USUAL  # type: ignore[assignment]
+    of: Mapping[str, str] = field(default_factory=lambda: _USUAL)
     source: str = ""
 
     def table(self, class_names: Sequence[str]) -> UInt8Array:
@@ -60,7 +60,7 @@ class LabelSet:
         numbers = {name: number for number, name in enumerate(self.names)} | {"": UNLABELLED}
         for name in class_names:
             if name not in self.of:
-                hint = f"say what it counts as in a classes file: [of] {name} = \"other\"   (of: {', '.join(self.names)})"
+                hint = f'say what it counts as in a classes file: [of] {name} = "other"   (of: {", ".join(self.names)})'
                 raise DatasetError(f"the class '{name}' has no place among the labels", where=self.source, hint=hint)
         return np.array([numbers[self.of[name]] for name in class_names], dtype=np.uint8)
 
@@ -85,9 +85,13 @@ def read_label_set(path: Path | None) -> LabelSet:
     table: dict[str, Any] = dict(source.table)
     names, of = table.pop("names", list(_COLOURS)), table.pop("of", {})
     if table:
-        raise DatasetError(f"no setting is called '{next(iter(table))}'", where=path, hint="a classes file has names and [of]")
+        raise DatasetError(
+            f"no setting is called '{next(iter(table))}'", where=path, hint="a classes file has names and [of]"
+        )
     if not isinstance(names, list) or not all(isinstance(name, str) and name for name in names) or not names:
-        raise DatasetError(f"names is {names!r}", where=source.place(["names"]), hint='names = ["wall", "door", "other"]')
+        raise DatasetError(
+            f"names is {names!r}", where=source.place(["names"]), hint='names = ["wall", "door", "other"]'
+        )
     if len(set(names)) < len(names) or len(names) >= UNLABELLED:
         raise DatasetError(f"{len(names)} names, {len(set(names))} different", where=source.place(["names"]))
     rest = "other" if "other" in names else ""
@@ -95,8 +99,10 @@ def read_label_set(path: Path | None) -> LabelSet:
     known = {*names, ""}
     for name, counts in of.items() if isinstance(of, dict) else ():
         if counts not in known:
-            hint = f"{closest(str(counts), names)}; \"\" for no label"
-            raise DatasetError(f"'{name}' counts as '{counts}', which is no name", where=source.place(["of", name]), hint=hint)
+            hint = f'{closest(str(counts), names)}; "" for no label'
+            raise DatasetError(
+                f"'{name}' counts as '{counts}', which is no name", where=source.place(["of", name]), hint=hint
+            )
     return LabelSet(tuple(names), {**usual, **{name: name for name in names}, **dict(of)}, str(path))
 
 

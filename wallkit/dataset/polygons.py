@@ -7,10 +7,11 @@ goes in, round the hole, and back. Filled by the even-odd rule, as cv2.fillPoly 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from wallkit.core.types import BoolArray, Float64Array, Int64Array, UInt8Array
+from wallkit.core.types import BoolArray, Float64Array, Int64Array
 
 _MOST_PX = 1.0
 # an outline may move by so much of the mean half width of its shape: thin things stay as they are
@@ -82,14 +83,14 @@ def polygons_from_yolo(text: str, shape: tuple[int, int]) -> list[tuple[int, Int
 # -------------------------------------------------------------------------------------------- details
 
 
-def _filled_px(contour: UInt8Array) -> float:
+def _filled_px(contour: Any) -> float:
     """Pixels in and on a contour, by Pick's theorem."""
     import cv2
 
     return float(cv2.contourArea(contour)) + len(contour) / 2 + 1
 
 
-def _simplified(contour: UInt8Array) -> Int64Array:
+def _simplified(contour: Any) -> Int64Array:
     """(P, 2) the contour with fewer points."""
     import cv2
 

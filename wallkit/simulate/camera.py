@@ -7,7 +7,7 @@ the renderer, which may differ by a pixel at edges.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -47,6 +47,12 @@ class Unit:
     def optics(self) -> Optics:
         """Of the true lens."""
         return optics_of(self.true)
+
+    def developing(self, photo: Photo) -> Unit:
+        """The same camera with another exposure, its optics kept: they take longer than a picture."""
+        other = replace(self, photo=photo)
+        other.__dict__["optics"] = self.optics
+        return other
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ from wallkit.simulate.textures import TEXTURES, Colour, Texture, colour, fractal
 _PX_PER_M = 400.0
 _LEAST_PX, _MOST_PX = 24, 900
 _FACETS = 24
+_GRAIN_PX = 128
 
 
 class Canvas:
@@ -24,7 +25,10 @@ class Canvas:
     def __init__(self, rng: np.random.Generator, size_m: tuple[float, float], base: Any) -> None:
         self.size_m = size_m
         self.px = tuple(int(np.clip(round(side * _PX_PER_M), _LEAST_PX, _MOST_PX)) for side in size_m)
-        shade = 1 + 0.006 * fractal(rng, (self.px[1], self.px[0]), slope=1.5)
+        # hardly seen, and most of the work if it were drawn for every pixel
+        grain = fractal(rng, (_GRAIN_PX, _GRAIN_PX), slope=1.5)
+        rows, columns = (np.arange(side) % _GRAIN_PX for side in self.px[::-1])
+        shade = 1 + 0.006 * np.ascontiguousarray(grain[np.ix_(rows, columns)])
         self.pixels = np.clip(shade[..., None] * np.array(base) * 255, 0, 255).astype(np.uint8)
 
     def ellipse(self, x: float, y: float, rx: float, ry: float, rgb: Any, *, line: float = 0.0) -> None:
