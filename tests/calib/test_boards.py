@@ -24,6 +24,8 @@ BOARDS = [
 ]
 PX_PER_MM = 4
 
+pytestmark = pytest.mark.opencv
+
 
 def drawn(sheet: Sheet) -> np.ndarray:
     """The page as pixels, 4 a millimetre, pixel (0, 0) covering the first quarter millimetre."""

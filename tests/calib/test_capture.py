@@ -19,6 +19,8 @@ from wallkit.calib.pattern import find_pattern
 from wallkit.calib.views import capture_from_npz
 from wallkit.errors import CalibrationError
 
+pytestmark = pytest.mark.opencv
+
 
 def pictures_of(images):
     return [

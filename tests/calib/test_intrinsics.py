@@ -81,6 +81,7 @@ def test_without_noise_the_camera_comes_back(model):
     np.testing.assert_allclose(found.camera.project(camera(model).unproject(pixels)), pixels, atol=1e-3)
 
 
+@pytest.mark.opencv
 @pytest.mark.parametrize("model", ["plumb_bob", "equidistant"])
 def test_the_least_squares_optimum_is_opencvs(model):
     rng = np.random.default_rng(3)
@@ -341,6 +342,7 @@ def opencv_samples(data, side: str, half_window: int | None) -> Capture:
     return capture_from_pictures(files, board_from("chessboard:9x6:0.025"), len(files), half_window=half_window)
 
 
+@pytest.mark.opencv
 @pytest.mark.parametrize(
     ("side", "rms", "K"),
     [
@@ -355,6 +357,7 @@ def test_opencvs_samples_give_the_reference(data, side, rms, K):
     np.testing.assert_allclose(found.camera.parameters[:4], K, atol=0.1)
 
 
+@pytest.mark.opencv
 def test_four_numbers_are_called_reprojection_error(data):
     capture = opencv_samples(data, "left", 5)
     plain = calibrate(capture, "plumb_bob").plain
@@ -362,6 +365,7 @@ def test_four_numbers_are_called_reprojection_error(data):
     np.testing.assert_allclose(list(errors.values()), (0.1962, 0.1388, 0.1754, 0.0265), atol=0.001)
 
 
+@pytest.mark.opencv
 @pytest.mark.parametrize("side", ["left", pytest.param("right", marks=pytest.mark.slow)])
 def test_the_half_window_of_the_spacing_beats_any_fixed_one(data, side):
     own = calibrate(opencv_samples(data, side, None), "plumb_bob")
@@ -369,6 +373,7 @@ def test_the_half_window_of_the_spacing_beats_any_fixed_one(data, side):
     assert calibrate(opencv_samples(data, side, 11), "plumb_bob").plain.rms_px > 0.39
 
 
+@pytest.mark.opencv
 def test_four_charuco_views_are_fitted_but_cannot_pass(data):
     files = pictures_of_files([data / "calib/opencv_charuco"])
     capture = capture_from_pictures(files, board_from("charuco:5x7:0.04:0.02:6X6_250"), len(files))

@@ -84,20 +84,42 @@ def test_a_log_gives_its_camera_and_accounts_for_every_frame(wallkit, film, tmp_
 
 
 def test_corners_of_a_careful_capture_pass(wallkit, corners, tmp_path):
-    done = wallkit("calib", "intrinsics", corners, "--board", WORDS, "--model", "plumb_bob", "-o", "out.toml")
+    done = wallkit(
+        "calib",
+        "intrinsics",
+        corners,
+        "--board",
+        WORDS,
+        "--model",
+        "plumb_bob",
+        "-o",
+        "out.toml",
+        "--report",
+        "out.html",
+    )
     assert done.code == 0, done.out + done.err
     assert "verdict  PASS" in done.out
     assert "sigma is clustered by view" in done.out
     found = read_calibration(tmp_path / "out.toml")
     assert found.verdict == "PASS"
     assert found.camera.K[0, 0] == pytest.approx(600, abs=1.5)
+    page = (tmp_path / "out.html").read_text()
+    assert "<strong>PASS</strong>" in page
+    assert page.count("data:image/svg+xml") == 3
+    assert f"{found.camera.K[0, 0]:.4f}" in page
+    assert "<script" not in page
+    assert 'src="http' not in page
 
 
-def test_four_pictures_cannot_tell(wallkit, pictures):
+def test_four_pictures_cannot_tell(wallkit, pictures, tmp_path):
     done = wallkit("calib", "intrinsics", pictures, "--board", WORDS, "--model", "k1k2", "--json", "-q")
     assert done.code == 4
     assert done.json["verdict"] == "CANNOT TELL"
     assert any("only 4 views" in gate["reason"] for gate in done.json["gates"])
+    done = wallkit("calib", "intrinsics", pictures, "--board", WORDS, "--model", "k1k2", "--report", "out.html", "-q")
+    page = (tmp_path / "out.html").read_text()
+    assert "<strong>CANNOT TELL</strong>" in page
+    assert "only 4 views" in page
 
 
 def test_a_dry_run_writes_nothing(wallkit, pictures, tmp_path):

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from wallkit.calib.camera_coverage import Coverage
 from wallkit.calib.camera_limits import CameraLimits
 from wallkit.calib.cross_validation import Candidate, Halves, grows_to_corner
@@ -80,7 +78,7 @@ def _sure_gates(found: Intrinsics, halves: Halves | None, limits: CameraLimits) 
             projection_sigma(found.camera, found.covariance).median,
             "px",
             good=limits.pixel_px * wider,
-            reason="more views, a board with more corners, or one that fills more of the image make it smaller",
+            reason="far points may land that far off: take more views, with the board over more of the image",
         ),
         _halves_gate(halves, wider, limits),
     )
@@ -91,10 +89,10 @@ def _halves_gate(halves: Halves | None, wider: float, limits: CameraLimits) -> G
     if halves is None:
         reason = "too few views for two halves"
         return Gate(name, float("nan"), "px", f"<= {limits.halves_sigmas:g} sigma", "CANNOT TELL", reason)
-    allowed, value = limits.halves_sigmas * halves.expected_px, halves.difference.median
+    allowed, value = round(limits.halves_sigmas * halves.expected_px, 2), halves.difference.median
     reason = f"two cameras from half the views each disagree (expected {halves.expected_px:.2f} px)"
     bad = max(allowed, limits.halves_bad_px * wider)
-    return below(name, value, "px", good=float(np.round(allowed, 3)), bad=bad, reason=reason)
+    return below(name, value, "px", good=allowed, bad=bad, reason=reason)
 
 
 def _coverage_gates(coverage: Coverage, limits: CameraLimits) -> tuple[Gate, ...]:

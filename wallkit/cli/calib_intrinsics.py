@@ -37,6 +37,12 @@ MODELS = ["auto", "k1k2", "radtan", "plumb_bob", "rational_polynomial", "equidis
 @click.option("--frame", default="", help="Optical frame of the camera in the result.")
 @common.out_option
 @click.option("--ros", type=click.Path(path_type=Path), metavar="FILE", help="Also write a ROS camera_info YAML.")
+@click.option(
+    "--report",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Also write an HTML page with figures and reasons.",
+)
 @common.overwrite_option
 @common.json_option
 @common.quiet_option
@@ -55,6 +61,7 @@ def intrinsics(
     frame: str,
     out: Path | None,
     ros: Path | None,
+    report: Path | None,
     overwrite: bool,
     as_json: bool,
     quiet: bool,
@@ -70,7 +77,7 @@ def intrinsics(
     \b
     Examples:
       wallkit calib intrinsics log.mcap --board board.toml -o front.toml
-      wallkit calib intrinsics pictures/ --board chessboard:9x6:0.025 -o front.toml --ros front.yaml
+      wallkit calib intrinsics pictures/ --board chessboard:9x6:0.025 -o front.toml --ros front.yaml --report front.html
       wallkit calib intrinsics corners.npz --size 1920x1208 --board chessboard:7x5:0.095 --model equidistant --json
     """
     from wallkit.calib.boards import board_from
@@ -79,7 +86,7 @@ def intrinsics(
     from wallkit.pipelines.outputs import check_file_out
 
     board, size = board_from(board_words), _size(size_words)
-    for path in (p for p in (out, ros) if p is not None):
+    for path in (p for p in (out, ros, report) if p is not None):
         check_file_out(path, overwrite=overwrite)
     if dry_run:
         click.echo(f"would look for {board.words} in {', '.join(map(str, inputs))} and write {out or 'nothing'}")
@@ -89,6 +96,11 @@ def intrinsics(
     with common.progress("searching", None, quiet=quiet) as update:
         result = calibrate_camera(request, model=model, name=name, frame=frame, command=words, progress=update)
     _write(result, out, ros)
+    if report is not None:
+        from wallkit.pipelines.calib_intrinsics_page import page_of
+        from wallkit.pipelines.outputs import write_whole
+
+        write_whole(report, page_of(result, [str(path) for path in inputs]).encode())
     if as_json:
         common.emit(document(result))
     else:
