@@ -47,7 +47,7 @@ def sheet_of(board: Board, *, paper: str = "") -> Sheet:
     width, height = _page(needed, paper)
     corner = np.array([(width - size[0]) / 2, (height - FOOT_MM - size[1]) / 2])
     low, _ = board.pattern_box
-    black = _black_rectangles(board) * 1e3
+    black = black_rectangles(board) * 1e3
     black[:, :2] += corner - low * 1e3
     bar, texts = _foot(board, width, height)
     return Sheet(width, height, np.concatenate([black, bar]), texts)
@@ -90,7 +90,7 @@ def _wrapped(text: str, width_mm: float) -> list[str]:
     return lines
 
 
-def _black_rectangles(board: Board) -> Float64Array:
+def black_rectangles(board: Board) -> Float64Array:
     """(n, 4) x, y, width, height of everything black, in frame B [m]."""
     if board.kind == "chessboard":
         low, _ = board.pattern_box

@@ -53,6 +53,7 @@ def doctor(ctx: click.Context, /, as_json: bool) -> None:
         click.echo(common.table(["library", "version"], rows))
         for name, use in OPTIONAL.items():
             click.echo(f"optional {name}: {found['optional'][name] or f'not installed ({use})'}")
+        click.echo(f"OpenGL for `wallkit simulate` pictures: {_gl_words(found['opengl'])}")
         click.echo(f"onnxruntime providers: {', '.join(found['onnxruntime_providers']) or '-'}")
         click.echo(f"compiled kernels are kept in {found['kernel_cache']}")
     if missing:
@@ -68,9 +69,29 @@ def _findings() -> dict[str, Any]:
         "cpus": os.cpu_count(),
         "libraries": {name: _version(name) for name in LIBRARIES},
         "optional": {name: _version(name) for name in OPTIONAL},
+        "opengl": _opengl(),
         "onnxruntime_providers": _providers(),
         "kernel_cache": _kernel_cache(),
     }
+
+
+def _opengl() -> dict[str, str] | None:
+    """Of each backend tried why it does not work, "" if it does; None without MuJoCo."""
+    from wallkit.simulate.gl import probe
+
+    return dict(probe()) if _version("mujoco") else None
+
+
+def _gl_words(reasons: dict[str, str] | None) -> str:
+    from wallkit.simulate.gl import APT_LINE, APT_LINE_OSMESA
+
+    if reasons is None:
+        return "MuJoCo is not installed (pip install 'wallkit[sim]')"
+    works = [name for name, reason in reasons.items() if not reason]
+    if works:
+        return works[0]
+    said = "; ".join(f"{name}: {reason}" for name, reason in reasons.items())
+    return f"none ({said}); {APT_LINE}, or {APT_LINE_OSMESA}; masks and LiDAR work without"
 
 
 def _version(name: str) -> str | None:

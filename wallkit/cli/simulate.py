@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from wallkit.cli import common
+from wallkit.cli.simulate_boards import boards
 from wallkit.cli.simulate_dataset import dataset
 
 if TYPE_CHECKING:
@@ -20,6 +21,9 @@ def simulate() -> None:
 
     Needs MuJoCo: pip install 'wallkit[sim]'. Pictures need OpenGL; `wallkit doctor` says whether it works.
     """
+
+
+simulate.add_command(boards)
 
 
 @simulate.command("log")

@@ -108,7 +108,7 @@ class LidarSensor:
 
     def sweep(self, at_ns: int, stamp_ns: int) -> Sweep:
         """One sweep that truly begins at a moment and says another."""
-        T_base_lidar = self.play.robot.frames[self.frame] @ _leaning(self.setup.roll_rad, self.setup.pitch_rad)
+        T_base_lidar = self.play.robot.frames[self.frame] @ leaning(self.setup.roll_rad, self.setup.pitch_rad)
 
         def place_of_lidar(now_ns: int) -> Float64Array:
             return np.asarray(matrix_from_pose(self.play.pose_at(now_ns)) @ T_base_lidar)
@@ -125,7 +125,8 @@ class LidarSensor:
         return replace(done, scan=replace(done.scan, stamp_ns=stamp_ns))
 
 
-def _leaning(roll_rad: float, pitch_rad: float) -> Float64Array:
+def leaning(roll_rad: float, pitch_rad: float) -> Float64Array:
+    """(4, 4) of a LiDAR that leans to its left and looks down."""
     from scipy.spatial.transform import Rotation
 
     T = np.eye(4)
