@@ -357,6 +357,13 @@ def test_opencvs_samples_give_the_reference(data, side, rms, K):
     np.testing.assert_allclose(found.camera.parameters[:4], K, atol=0.1)
 
 
+def test_pictures_of_two_cameras_do_not_pass_as_one(data):
+    left, right = opencv_samples(data, "left", 5), opencv_samples(data, "right", 5)
+    gates = judged(replace(left, views=(*left.views, *right.views)))
+    assert verdict_of(gates) != "PASS"
+    assert "halves differ by, median" in {gate.name for gate in gates if gate.verdict != "PASS"}
+
+
 @pytest.mark.opencv
 def test_four_numbers_are_called_reprojection_error(data):
     capture = opencv_samples(data, "left", 5)

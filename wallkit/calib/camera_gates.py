@@ -89,9 +89,10 @@ def _halves_gate(halves: Halves | None, wider: float, limits: CameraLimits) -> G
     if halves is None:
         reason = "too few views for two halves"
         return Gate(name, float("nan"), "px", f"<= {limits.halves_sigmas:g} sigma", "CANNOT TELL", reason)
-    allowed, value = round(limits.halves_sigmas * halves.expected_px, 2), halves.difference.median
+    expected, value = round(limits.halves_sigmas * halves.expected_px, 2), halves.difference.median
+    allowed = min(expected, 2 * limits.pixel_px * wider)
     reason = f"two cameras from half the views each disagree (expected {halves.expected_px:.2f} px)"
-    bad = max(allowed, limits.halves_bad_px * wider)
+    bad = max(expected, limits.halves_bad_px * wider)
     return below(name, value, "px", good=allowed, bad=bad, reason=reason)
 
 

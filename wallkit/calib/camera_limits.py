@@ -20,9 +20,9 @@ class CameraLimits:
             beyond. Of 40 views moved to the edges and corners with 0.1 px noise it is 0.10 to 0.15 px (a whole 9 x 6
             chessboard) and 0.2 to 0.4 px (17 corners of a ChArUco board); with 0.2 px it is twice that.
         halves_sigmas, halves_bad_px: two cameras from every other view each differ by as much as the sum of their sigmas
-            where these are honest; FAIL beyond twice that and so many pixels. How large the sigmas are is asked by
-            pixel_px: half the views err sqrt(2) times as much as all, so that their difference is twice as uncertain as
-            the result, and a bound in pixels on it failed sound captures.
+            where these are honest; FAIL beyond twice that and so many pixels. They may differ by twice pixel_px, too: half
+            the views err sqrt(2) times as much as all, so their difference is twice as uncertain as the result. Half a pixel
+            failed careful captures with 0.2 px noise (0.75 px); the pictures of two cameras taken for one have 1.9 px.
         hull, cells: shares of the image that the corners span and of its 5 x 5 cells that hold one. A 9 x 6 chessboard
             moved to the edges reaches 0.78 and 1.0, a ChArUco board 0.97; one kept in the middle 0.3.
         tilted: views tilted by more than 25 deg about each axis; without, focal length and distance are the same.
