@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from tests.maps.drawn import box, many_walls, placed, ring, robot, wall
 from wallkit.maps.document import apply_edits
+from wallkit.maps.numbers import meant_angle
 from wallkit.maps.rules import RULES, validate
-from wallkit.maps.rules.shapes import _meant_angle
 from wallkit.maps.rules.solids import penetration
 from wallkit.maps.rules.tolerances import Tolerances
 from wallkit.maps.xml import parse
@@ -259,7 +259,7 @@ def test_walls_cross_only_where_both_go_on():
     ],
 )
 def test_rounded_constants_are_told_from_angles(word, eighths):
-    meant = _meant_angle(word)
+    meant = meant_angle(word)
     assert meant == (None if eighths is None else pytest.approx(eighths * math.pi / 4, abs=1e-12))
 
 
