@@ -9,6 +9,7 @@ from wallkit.cli.bench import bench
 from wallkit.cli.calib import calib
 from wallkit.cli.common import CONTEXT, WallkitGroup
 from wallkit.cli.config import completion, config
+from wallkit.cli.dataset import dataset
 from wallkit.cli.demo import demo
 from wallkit.cli.doctor import doctor
 from wallkit.cli.evaluate import compare, evaluate, report
@@ -34,7 +35,7 @@ def main() -> None:
 
 
 COMMANDS = (
-    *(demo, log, map_group, calib, localize, evaluate, compare, report, simulate),
+    *(demo, log, map_group, calib, localize, evaluate, compare, report, simulate, dataset),
     *(bench, config, completion, doctor),
 )
 for command in COMMANDS:

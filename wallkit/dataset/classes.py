@@ -33,7 +33,7 @@ _USUAL = {
     **{name: name for name in _COLOURS},
     "column": "wall",
     "window": "glass",
-    **dict.fromkeys(("trash", "dispenser", "radiator", "furniture", "cart", "unknown"), "other"),
+    **dict.fromkeys(("trash", "dispenser", "radiator", "furniture", "cart", "fitting", "unknown"), "other"),
 }
 
 

@@ -33,9 +33,9 @@ def split_of_groups(groups: Sequence[str], share: float, seed: int) -> dict[str,
     return {name: SPLITS[number in chosen] for number, name in enumerate(names)}
 
 
-def data_yaml(labels: LabelSet, *, comment: str) -> str:
+def data_yaml(labels: LabelSet, *, comment: str, val: str = "images/val") -> str:
     """The file that YOLO trainers are given; paths are relative to it."""
-    lines = [f"# {comment}", "path: .", "train: images/train", "val: images/val", f"nc: {len(labels.names)}", "names:"]
+    lines = [f"# {comment}", "path: .", "train: images/train", f"val: {val}", f"nc: {len(labels.names)}", "names:"]
     return "\n".join([*lines, *(f"  {number}: {name}" for number, name in enumerate(labels.names)), ""])
 
 
@@ -79,10 +79,11 @@ def coco_document(records: Sequence[Record], labels: LabelSet, *, description: s
 def statistics_of(records: Sequence[Record], labelling: Labelling) -> Record:
     """Of each split and class: pictures that show it, pixels and things; and what was too small to count."""
     found: Record = {}
+    count = len(labelling.labels.names)
     for split in SPLITS:
         own = [record for record in records if record["split"] == split]
-        pixels = np.array([r["pixels"] for r in own], dtype=np.int64).reshape(len(own), -1)
-        things = np.array([r["things"] for r in own], dtype=np.int64).reshape(len(own), -1)
+        pixels = np.array([r["pixels"] for r in own], dtype=np.int64).reshape(len(own), count)
+        things = np.array([r["things"] for r in own], dtype=np.int64).reshape(len(own), count)
         total = sum(r["width"] * r["height"] for r in own)
         classes = {
             name: {

@@ -85,7 +85,9 @@ def write_picture(layout: Layout, labelled: Labelled, split: str) -> Record:
     return record
 
 
-def write_documents(layout: Layout, records: Sequence[Record], *, title: str, with_labels: bool = True) -> Record:
+def write_documents(
+    layout: Layout, records: Sequence[Record], *, title: str, with_labels: bool = True, val: str = "images/val"
+) -> Record:
     """Writes what is about all pictures; the statistics come back."""
     labels = layout.labelling.labels
     statistics = statistics_of(records, layout.labelling)
@@ -96,7 +98,7 @@ def write_documents(layout: Layout, records: Sequence[Record], *, title: str, wi
             document = coco_document(own, labels, description=title)
             text = json.dumps(document, separators=(",", ":"))
             (layout.folder / "annotations" / f"instances_{split}.json").write_text(text, encoding="utf-8")
-        (layout.folder / "data.yaml").write_text(data_yaml(labels, comment=title), encoding="utf-8")
+        (layout.folder / "data.yaml").write_text(data_yaml(labels, comment=title, val=val), encoding="utf-8")
         text = json.dumps({"schema": 1, **statistics}, indent=1)
         (layout.folder / "statistics.json").write_text(text + "\n", encoding="utf-8")
     (layout.folder / "contact-sheet.png").write_bytes(_sheet(layout, records, title))
