@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from wallkit.calib.coarse_offset import coarse_offset, traces_at
 from wallkit.calib.time_offset import BoardTrack, TimedTrace, poses_at, time_offset
 from wallkit.calib.worlds import UPRIGHT, World, board_at, hits
+from wallkit.core.types import Scan
 
+PLATE = np.array([[-0.4, -0.3, 0], [0.4, -0.3, 0], [0.4, 0.3, 0], [-0.4, 0.3, 0]])
 T = np.eye(4)
 T[:3, :3], T[:3, 3] = UPRIGHT, (0.03, 0.08, -0.06)
 IMAGE_NS, SCAN_NS = 50_000_000, 100_000_000
@@ -35,6 +38,21 @@ def recorded(tau_s, *, amplitude=0.3, seed=0, seconds=12.0):
         points = hits(world, T, waved(begin / 1e9, amplitude=amplitude), rng)
         traces.append(TimedTrace(points, np.full(len(points), begin, dtype=np.int64)))
     return track, traces
+
+
+def recorded_room(tau_s, *, seconds=12.0):
+    """The same, but whole scans of a room with walls 4 m away."""
+    track, _ = recorded(tau_s, seconds=seconds)
+    rng = np.random.default_rng(1)
+    angles = np.radians(np.arange(-180.0, 180.0, 1.0))
+    world, scans = World(beam_deg=1.0), []
+    for begin in range(200_000_000, int(seconds * 1e9) - 300_000_000, SCAN_NS):
+        ranges = 4.0 / np.maximum(np.abs(np.cos(angles)), np.abs(np.sin(angles))) + rng.normal(0, 0.01, 360)
+        points = hits(world, T, waved(begin / 1e9), rng)
+        beams = np.round(np.degrees(np.arctan2(points[:, 1], points[:, 0]))).astype(int) + 180
+        ranges[beams] = np.linalg.norm(points, axis=1)
+        scans.append(Scan(begin, "laser", ranges.astype(np.float32), angles.astype(np.float32), 0.0, 0.1, 12.0))
+    return track, scans
 
 
 @pytest.mark.parametrize("tau_ms", [-60.0, 0.0, 35.0])
@@ -74,3 +92,31 @@ def test_poses_between_images():
     np.testing.assert_allclose(velocity[0, 3:], speed, atol=5e-3)
     gappy = BoardTrack(track.stamps_ns[::5], track.poses[::5])
     assert np.isnan(poses_at(gappy, between)[0]).all()
+
+
+@pytest.mark.parametrize("tau_ms", [30.0, 150.0, -400.0])
+def test_large_offsets_are_found_from_nothing(tau_ms):
+    """A room with the board in it, scanned whole: the coarse search finds offsets far beyond the fine one's reach."""
+    track, scans = recorded_room(tau_ms / 1e3)
+    coarse = coarse_offset(track, scans, T, PLATE, sigma_range_m=0.01)
+    assert coarse == pytest.approx(tau_ms / 1e3, abs=0.05)
+    traces = traces_at(track, scans, T, PLATE, coarse, sigma_range_m=0.01)
+    found = time_offset(track, traces, T, sigma_range_m=0.01, start_s=coarse)
+    assert found.verdict == "known"
+    assert abs(found.tau_s * 1e3 - tau_ms) < 3.5 * found.sigma_s * 1e3 + 1.0
+
+
+def test_a_board_that_only_approaches_cannot_separate_clock_and_place():
+    """At one speed, every millisecond is a millimetre: tau and the shift along the way are one."""
+    rng = np.random.default_rng(0)
+    stamps = np.arange(0, 4_000_000_000, IMAGE_NS)
+    poses = [board_at(0.0, 0.05, 1.0 + 0.3 * t / 1e9, pitch_deg=0, yaw_deg=0) for t in stamps]
+    track = BoardTrack(stamps, np.array(poses))
+    traces = []
+    for begin in range(200_000_000, 3_700_000_000, SCAN_NS):
+        pose = board_at(0.0, 0.05, 1.0 + 0.3 * begin / 1e9, pitch_deg=0, yaw_deg=0)
+        points = hits(World(beam_deg=1.0), T, pose, rng)
+        traces.append(TimedTrace(points, np.full(len(points), begin, dtype=np.int64)))
+    found = time_offset(track, traces, T, sigma_range_m=0.01)
+    assert found.verdict == "cannot separate"
+    assert "would look the same" in found.words

@@ -51,7 +51,7 @@ def test_the_page_says_what_a_user_needs(wallkit, board_log, tmp_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--board", "chessboard:9x7:0.07"), "is in none of"),
+        (("--board", "chessboard:9x7:0.07"), "did you mean --board chessboard:8x6:0.07"),
         (("--board", "chessboard:8x6:0.07", "--hold"), "--hold needs a transform"),
         (("--board", "chessboard:8x6:0.07", "--sigma-range", "vlp-61"), "did you mean 'vlp-16'"),
         (("--board", "chessboard:8x6:0.07", "--scan", "/points"), "no topic '/points'"),

@@ -142,6 +142,7 @@ def _npz(path: Path) -> dict[str, Float64Array]:
             angles = float(arrays["angle_min"]) + float(arrays["angle_increment"]) * np.arange(
                 len(ranges), dtype=np.float64
             )
+        ranges = np.where(np.isfinite(ranges), ranges, np.nan)
         return {"x": ranges * np.cos(angles), "y": ranges * np.sin(angles)}
 
 
@@ -154,7 +155,8 @@ def _csv(text: str) -> dict[str, Float64Array]:
         names = ["x", "y", "z"][: len(names)]
     columns = dict(zip(names, table.T, strict=False))
     if "range" in columns and "angle" in columns:
-        return {"x": columns["range"] * np.cos(columns["angle"]), "y": columns["range"] * np.sin(columns["angle"])}
+        ranges = np.where(np.isfinite(columns["range"]), columns["range"], np.nan)
+        return {"x": ranges * np.cos(columns["angle"]), "y": ranges * np.sin(columns["angle"])}
     return columns
 
 

@@ -139,11 +139,11 @@ def _judged(blocks: Sequence[tuple[Float64Array, Float64Array]], tau: float, sig
     try:
         spread = spread_of(J, r)
     except np.linalg.LinAlgError:
-        # what the boards cannot show of the transform does not hinder the clock: leave it where it is
+        # what the boards cannot show of the transform does not hinder the clock, unless it looks like the clock
         spread = spread_of(J[:, :, 6:], r)
     sigmas = spread.sigmas
     sigma = float(sigmas[-1])
-    correlation = 0.0
+    correlation = _share_in_others(J.reshape(-1, 7))
     if len(sigmas) == 7:
         correlation = float(np.abs(spread.covariance[6, :6] / (sigmas[6] * sigmas[:6])).max())
     interval_ms = 1e3 * sigma * float(quantiles(spread.degrees[-1:])[0])
@@ -157,6 +157,13 @@ def _judged(blocks: Sequence[tuple[Float64Array, Float64Array]], tau: float, sig
             tau, sigma, speed, correlation, "cannot separate", f"{said}, but a shift of the LiDAR would look the same"
         )
     return TimeOffset(tau, sigma, speed, correlation, "known", said)
+
+
+def _share_in_others(J: Float64Array) -> float:
+    """Multiple correlation of the last column with the others, which may depend on each other."""
+    others, last = J[:, :-1] / np.maximum(np.linalg.norm(J[:, :-1], axis=0), 1e-12), J[:, -1]
+    left = last - others @ np.linalg.lstsq(others, last, rcond=1e-8)[0]
+    return float(np.sqrt(max(0.0, 1 - (left @ left) / (last @ last))))
 
 
 def _nothing(words: str, speed: float = 0.0) -> TimeOffset:

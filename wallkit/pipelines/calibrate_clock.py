@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from wallkit.calib.board_pose import AMBIGUOUS, pose_of_board
+from wallkit.calib.coarse_offset import FARTHEST_S, coarse_offset, traces_at
 from wallkit.calib.detect import find_quickly
-from wallkit.calib.scan_board import find_trace, returns_of
-from wallkit.calib.sightings import BoardPose
-from wallkit.calib.time_offset import BoardTrack, TimedTrace, TimeOffset, time_offset
-from wallkit.core.types import CameraImage, Int64Array, Scan
+from wallkit.calib.time_offset import BoardTrack, TimeOffset, time_offset
+from wallkit.core.types import CameraImage, Scan
 from wallkit.logs.reader import Log, open_log
 from wallkit.pipelines.calibrate_extrinsics import ExtrinsicsRun, Gathered, outline_of
 from wallkit.pipelines.calibrate_log import grey_of
@@ -34,9 +33,11 @@ def with_clock(run: ExtrinsicsRun) -> tuple[ExtrinsicsRun, TimeOffset | None]:
     track = _track(log, source.images, run.gathered, windows)
     if track is None:
         return run, TimeOffset(0.0, np.inf, 0.0, 0.0, "cannot tell", "the board is blurred whenever it moves")
-    found = time_offset(
-        track, _traces(log, source.scans, run, track), run.result.T, sigma_range_m=run.options.sigma_range_m
-    )
+    scans = _scans(log, source.scans, track)
+    (plate, known), T, sigma_m = outline_of(run.gathered.board), run.result.T, run.options.sigma_range_m
+    coarse_s = coarse_offset(track, scans, T, plate, sigma_range_m=sigma_m, plate_is_known=known)
+    traces = traces_at(track, scans, T, plate, coarse_s, sigma_range_m=sigma_m, plate_is_known=known)
+    found = time_offset(track, traces, T, sigma_range_m=sigma_m, start_s=coarse_s)
     if found.verdict != "known":
         return run, found
     gathered = replace(
@@ -78,22 +79,12 @@ def _track(log: Log, topic: str, gathered: Gathered, windows: list[tuple[int, in
     return BoardTrack(np.array(stamps, dtype=np.int64)[order], np.array(poses)[order])
 
 
-def _traces(log: Log, topic: str, run: ExtrinsicsRun, track: BoardTrack) -> list[TimedTrace]:
-    plate, known = outline_of(run.gathered.board)
-    traces = []
-    begin, end = int(track.stamps_ns[0]) - _NEAR_NS, int(track.stamps_ns[-1]) + _NEAR_NS
-    for message in log.messages([topic], begin, end):
+def _scans(log: Log, topic: str, track: BoardTrack) -> list[Scan]:
+    """Scans of the times when the board was seen, whatever the offset is."""
+    reach = _NEAR_NS + int(FARTHEST_S * 1e9)
+    scans = []
+    for message in log.messages([topic], int(track.stamps_ns[0]) - reach, int(track.stamps_ns[-1]) + reach):
         scan = message.value
-        if not isinstance(scan, Scan):
-            continue
-        nearest = int(np.abs(track.stamps_ns - scan.stamp_ns).argmin())
-        if abs(int(track.stamps_ns[nearest]) - scan.stamp_ns) > _NEAR_NS:
-            continue
-        board = BoardPose(track.poses[nearest], np.eye(6))
-        trace = find_trace(
-            returns_of(scan), board, plate, run.result.T, sigma_range_m=run.options.sigma_range_m, plate_is_known=known
-        )
-        if not trace.why and trace.offsets_s is not None:
-            times: Int64Array = scan.stamp_ns + np.round(trace.offsets_s * 1e9).astype(np.int64)
-            traces.append(TimedTrace(trace.points_m, times))
-    return traces
+        if isinstance(scan, Scan) and int(np.abs(track.stamps_ns - scan.stamp_ns).min()) <= reach:
+            scans.append(scan)
+    return scans

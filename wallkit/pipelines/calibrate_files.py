@@ -10,12 +10,13 @@ import numpy as np
 from wallkit.calib.board_pose import AMBIGUOUS, pose_of_board
 from wallkit.calib.boards import Board
 from wallkit.calib.detect import find_corners
+from wallkit.calib.pattern import explain_larger, explain_nothing_found
 from wallkit.calib.scan_board import returns_of_points
 from wallkit.calib.scan_files import paired, read_scan, scan_files
 from wallkit.calib.store import read_calibration
 from wallkit.calib.views import capture_from_npz
 from wallkit.core.camera import Camera
-from wallkit.core.types import Float64Array, Int64Array
+from wallkit.core.types import Float64Array, Int64Array, UInt8Array
 from wallkit.errors import CalibrationError
 from wallkit.pipelines.calibrate_extrinsics import Gathered, LeftOut, Pair
 
@@ -61,6 +62,8 @@ def gather_files(
             left_out.append(pair)
         else:
             found.append(pair)
+    if pictures:
+        _check_pattern([pictures[i] for i, _ in pairs], found, board)
     read = [camera_file, *(pictures or inputs[:1]), *(files[j] for _, j in pairs)]
     return Gathered(
         camera,
@@ -112,17 +115,38 @@ def _corners_from_npz(path: Path, board: Board, camera: Camera) -> list[tuple[st
     return [(view.name, view.ids, view.pixels) for view in capture.views]
 
 
-def _corners_of_picture(path: Path, board: Board, camera: Camera) -> tuple[Int64Array, Float64Array] | None:
+def _check_pattern(pictures: Sequence[Path], found: Sequence[Pair], board: Board) -> None:
+    """Refuse a board that is in none of the pictures, or is a part of a larger one, and say what is there instead.
+
+    Raises:
+        CalibrationError: so it is.
+    """
+    seen = {pair.name for pair in found}
+    chosen = [p for p in pictures if p.name in seen or not seen]
+    few = [chosen[int(i)] for i in np.linspace(0, len(chosen) - 1, min(3, len(chosen)))]
+    if not seen:
+        raise explain_nothing_found(map(_grey_of, few), board, len(pictures))
+    larger = explain_larger(map(_grey_of, few), board)
+    if larger is not None:
+        raise larger
+
+
+def _grey_of(path: Path) -> UInt8Array:
     import cv2
 
     data = np.fromfile(path, np.uint8)
     grey = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE) if len(data) else None
     if grey is None:
         raise CalibrationError("is no picture that can be read", where=path)
+    return np.asarray(grey, dtype=np.uint8)
+
+
+def _corners_of_picture(path: Path, board: Board, camera: Camera) -> tuple[Int64Array, Float64Array] | None:
+    grey = _grey_of(path)
     if grey.shape != (camera.height, camera.width):
         sizes = f"{grey.shape[1]} x {grey.shape[0]} px, the calibration is for {camera.width} x {camera.height}"
         raise CalibrationError(
             f"the picture has {sizes}", where=path, hint="the intrinsics are of another camera or mode"
         )
-    found = find_corners(np.asarray(grey), board)
+    found = find_corners(grey, board)
     return None if found is None else (found.ids, found.pixels)

@@ -6,7 +6,7 @@ Neither is ever in memory as a whole.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +15,7 @@ import numpy as np
 from wallkit.calib.board_pose import AMBIGUOUS, pose_of_board
 from wallkit.calib.boards import Board
 from wallkit.calib.detect import find_quickly
+from wallkit.calib.pattern import explain_larger, explain_nothing_found
 from wallkit.calib.scan_board import returns_of
 from wallkit.calib.sightings import BoardPose
 from wallkit.calib.store import read_calibration
@@ -67,10 +68,10 @@ def gather_log(
     camera = stored.camera if stored else _camera_of(log, images.topic)
     moments, looked_at, left_out = _moments(log, images.topic, camera, board, done)
     if not moments:
-        hint = "check --board: columns and rows of a chessboard count inner corners"
-        raise CalibrationError(
-            f"the board {board.words} is in none of {looked_at} images of {images.topic}", where=log.name, hint=hint
-        )
+        raise explain_nothing_found(_few_greys(log, images.topic, []), board, looked_at)
+    larger = explain_larger(_few_greys(log, images.topic, moments), board)
+    if larger is not None:
+        raise larger
     speeds = _speeds(moments)
     kept, notes = _still(moments, speeds)
     nearest, frame = _nearest_scans(log, scans.topic, [m.stamp_ns for m in kept])
@@ -80,6 +81,8 @@ def gather_log(
         name = f"{moment.stamp_ns / 1e9:.3f}"
         if scan is None:
             left_out.append(LeftOut(name, f"no scan within {TOLERANCE_S * 1e3:.0f} ms"))
+        elif not _has_returns(scan):
+            left_out.append(LeftOut(name, "the scan is empty: nothing in it is a return"))
         else:
             pairs.append(_pair(name, moment, scan))
     covariance = stored.camera_covariance if stored else None
@@ -133,6 +136,23 @@ def _moments(
         T = pose.T_camera_board
         moments.append(_Moment(message.stamp_ns, pose, board.plate_corners @ T[:3, :3].T + T[:3, 3]))
     return moments, looked_at, left_out
+
+
+def _few_greys(log: Log, topic: str, moments: Sequence[_Moment], wanted: int = 3) -> Iterator[UInt8Array]:
+    """Images of some moments; when there are none, images spread over the log."""
+    stamps = [m.stamp_ns for m in moments]
+    if not stamps:
+        stamps = [m.stamp_ns for m in log.messages([topic]) if isinstance(m.value, CameraImage)]
+    chosen = {stamps[int(i)] for i in np.linspace(0, len(stamps) - 1, wanted + 2)[1:-1]} if stamps else set()
+    for message in log.messages([topic]):
+        if message.stamp_ns in chosen and isinstance(message.value, CameraImage):
+            yield grey_of(message.value)
+
+
+def _has_returns(scan: Scan | PointCloud) -> bool:
+    if isinstance(scan, Scan):
+        return len(returns_of(scan).points_m) > 0
+    return bool(np.isfinite(scan.points_m).all(axis=1).any())
 
 
 def grey_of(image: CameraImage) -> UInt8Array:
