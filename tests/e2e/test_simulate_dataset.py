@@ -112,3 +112,28 @@ def test_random_buildings_are_valid_maps(seed):
     assert [str(f) for f in report.findings if f.severity == "error"] == []
     assert report.map is not None
     assert {"wall", "door"} <= {link.class_name for link in report.map.links.values()}
+
+
+def test_an_interrupted_run_goes_on_where_it_stopped(made, tmp_path, wallkit, monkeypatch):
+    """Its second scene was never made: the first one is taken as it is, and the whole is what it would have been."""
+    from wallkit.pipelines import simulate_dataset as pipeline
+
+    out, _ = made
+    request = pipeline.DatasetRequest(6, 4, (), (160, 120), 3, 0.5)
+    real = pipeline.make_scene
+
+    def stopped(request, folder, number):
+        if number == 1:
+            raise KeyboardInterrupt
+        return real(request, folder, number)
+
+    monkeypatch.setattr(pipeline, "make_scene", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        pipeline.simulate_dataset(request, tmp_path / "set")
+    assert not (tmp_path / "set").exists()
+    done = wallkit("simulate", "dataset", *WORDS, "-o", tmp_path / "set", "--json")
+    assert done.code == 0, done.err
+    assert done.json["resumed"] == 1
+    for path in out.rglob("masks/*/*.png"):
+        assert (tmp_path / "set" / path.relative_to(out)).read_bytes() == path.read_bytes()
+    assert [path.name for path in tmp_path.iterdir()] == ["set"]
