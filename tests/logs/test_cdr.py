@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_typestore
 
-from wallkit.core.geometry import matrix_from_quaternion
+from wallkit.core.geometry import matrix_from_quaternion, quaternions_from_matrices
 from wallkit.core.types import (
     CameraImage,
     CameraInfo,
@@ -20,7 +20,6 @@ from wallkit.core.types import (
     Transform,
 )
 from wallkit.logs.cdr import beam_angles, odometry_from_cdr, planar_pose, scan_from_cdr, transforms_from_cdr
-from wallkit.logs.cdr_write import quaternion_from_matrix
 from wallkit.logs.decode import FAST_DECODERS, decoder
 from wallkit.logs.encode import ENCODERS, encode
 from wallkit.logs.loss import Loss
@@ -137,7 +136,7 @@ def test_big_endian_goes_through_rosbags():
 @given(quaternions)
 def test_quaternion_of_a_matrix_is_the_rotation(q):
     matrix = matrix_from_quaternion((0, 0, 0), q)
-    found = quaternion_from_matrix(matrix)
+    found = quaternions_from_matrices(matrix[None])[0]
     np.testing.assert_allclose(matrix_from_quaternion((0, 0, 0), found), matrix, atol=1e-9)
     assert found[3] >= 0
     assert np.linalg.norm(found) == pytest.approx(1)

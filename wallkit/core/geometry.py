@@ -94,6 +94,28 @@ def matrix_from_quaternion(translation: ArrayLike, xyzw: ArrayLike) -> Float64Ar
     return m
 
 
+def quaternions_from_matrices(matrices: ArrayLike) -> Float64Array:
+    """(N, 4) x, y, z, w of the rotations in (N, 3, 3) or (N, 4, 4) matrices, w >= 0.
+
+    Of the four ways to work a quaternion out the one with the largest term is taken, which never divides by little
+    (Shepperd 1978).
+    """
+    m = np.asarray(matrices, dtype=np.float64)
+    xx, yy, zz = m[:, 0, 0], m[:, 1, 1], m[:, 2, 2]
+    x, y, z = m[:, 2, 1] - m[:, 1, 2], m[:, 0, 2] - m[:, 2, 0], m[:, 1, 0] - m[:, 0, 1]
+    xy, xz, yz = m[:, 1, 0] + m[:, 0, 1], m[:, 2, 0] + m[:, 0, 2], m[:, 2, 1] + m[:, 1, 2]
+    ways = np.empty((len(m), 4, 4))
+    ways[:, 0] = np.stack([1 + xx - yy - zz, xy, xz, x], axis=1)
+    ways[:, 1] = np.stack([xy, 1 + yy - xx - zz, yz, y], axis=1)
+    ways[:, 2] = np.stack([xz, yz, 1 + zz - xx - yy, z], axis=1)
+    ways[:, 3] = np.stack([x, y, z, 1 + xx + yy + zz], axis=1)
+    rows = np.arange(len(m))
+    largest = np.argmax(ways[:, range(4), range(4)], axis=1)
+    q = ways[rows, largest]
+    q /= np.sqrt(np.sum(q * q, axis=1))[:, None]
+    return np.where(q[:, 3:] < 0, -q, q)
+
+
 def invert_matrix(ab: Float64Array) -> Float64Array:
     """T_ba of a (4, 4) rigid transform T_ab."""
     ba = np.eye(4)

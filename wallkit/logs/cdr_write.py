@@ -65,23 +65,6 @@ class CdrBuilder:
         return bytes(self._data)
 
 
-def quaternion_from_matrix(matrix: Float64Array) -> tuple[float, float, float, float]:
-    """(x, y, z, w) of the rotation in a (4, 4) transform, w >= 0 (Shepperd 1978: the largest term is taken first)."""
-    m = matrix
-    trace = m[0, 0] + m[1, 1] + m[2, 2]
-    terms = (m[0, 0], m[1, 1], m[2, 2], trace)
-    largest = int(np.argmax(terms))
-    if largest == 3:
-        q = np.array([m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], 1 + trace])
-    else:
-        i, j, k = largest, (largest + 1) % 3, (largest + 2) % 3
-        q = np.zeros(4)
-        q[i] = 1 + m[i, i] - m[j, j] - m[k, k]
-        q[j], q[k], q[3] = m[j, i] + m[i, j], m[k, i] + m[i, k], m[k, j] - m[j, k]
-    q *= (1 if q[3] >= 0 else -1) / np.linalg.norm(q)
-    return float(q[0]), float(q[1]), float(q[2]), float(q[3])
-
-
 def planar_numbers(poses: Float64Array | Sequence[float]) -> Float64Array:
     """(N, 7) position and quaternion x y z qx qy qz qw of planar poses (N, 3) or (3,)."""
     poses = np.atleast_2d(np.asarray(poses, dtype=np.float64))

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from wallkit.core.geometry import quaternions_from_matrices
 from wallkit.core.types import (
     CameraImage,
     CameraInfo,
@@ -18,7 +19,7 @@ from wallkit.core.types import (
     StampedPose,
     Transform,
 )
-from wallkit.logs.cdr_write import CdrBuilder, covariance_numbers, planar_numbers, quaternion_from_matrix
+from wallkit.logs.cdr_write import CdrBuilder, covariance_numbers, planar_numbers
 from wallkit.logs.message import Value
 
 COMPRESSED = ("jpeg", "png", "webp")
@@ -62,7 +63,7 @@ def _transforms(transforms: Sequence[Transform]) -> tuple[str, bytes]:
     message = CdrBuilder().values("I", len(transforms))
     for t in transforms:
         message.header(t.stamp_ns, t.parent).text(t.child)
-        message.values("d", *t.matrix[:3, 3], *quaternion_from_matrix(t.matrix))
+        message.values("d", *t.matrix[:3, 3], *quaternions_from_matrices(t.matrix[None])[0])
     return "tf2_msgs/msg/TFMessage", message.done()
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from wallkit.core.geometry import quaternions_from_matrices
 from wallkit.core.types import Float64Array, Int64Array
 from wallkit.errors import SimulationError
 from wallkit.simulate.world import MAP, Light, Solid, World
@@ -164,13 +165,12 @@ def pose_mocap(
     model: mujoco.MjModel, data: mujoco.MjData, mocap: Mapping[str, int], poses: Mapping[str, Float64Array]
 ) -> None:
     """Puts bodies (by name, T_map_body (4, 4)) where they are; `mocap` has the rows of the bodies."""
-    from scipy.spatial.transform import Rotation
-
     if poses:
         rows = [mocap[name] for name in poses]
         matrices = np.stack(list(poses.values()))
         data.mocap_pos[rows] = matrices[:, :3, 3]
-        data.mocap_quat[rows] = Rotation.from_matrix(matrices[:, :3, :3]).as_quat(scalar_first=True)
+        # MuJoCo has w first
+        data.mocap_quat[rows] = np.roll(quaternions_from_matrices(matrices), 1, axis=1)
     mujoco_module().mj_kinematics(model, data)
 
 
@@ -223,6 +223,4 @@ def add_primitive(spec: mujoco.MjSpec, body: Any, solid: Solid, **more: Any) -> 
 
 def _place(T: Float64Array) -> tuple[list[float], list[float]]:
     """Position and quaternion (w first) of a transform."""
-    from scipy.spatial.transform import Rotation
-
-    return T[:3, 3].tolist(), Rotation.from_matrix(T[:3, :3]).as_quat(scalar_first=True).tolist()
+    return T[:3, 3].tolist(), np.roll(quaternions_from_matrices(T[None])[0], 1).tolist()
