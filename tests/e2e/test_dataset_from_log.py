@@ -115,6 +115,18 @@ def test_poses_scans_and_labels_are_those_of_the_log(logs, tmp_path, wallkit):
     assert cameras["run1"]["/camera/front/camera_info"]["width"] == 96
 
 
+def test_a_log_without_masks_has_no_labels(logs, tmp_path, wallkit):
+    story = (logs / "story.toml").read_text().replace('masks = "raster"', 'masks = "none"')
+    (tmp_path / "plain.toml").write_text(story)
+    words = ["simulate", "log", logs / "m.wkmap.urdf", "--scenario", "plain.toml", "-o", "run3", "-q"]
+    assert wallkit(*words).code == 0
+    done = wallkit("dataset", "from-log", "run3/log.mcap", "--val", "0", "-o", "set", "--json", "-q")
+    assert (done.code, done.json["written"], done.json["labelled"]) == (0, 9, 0), done.err
+    assert not {"labels", "masks", "annotations", "data.yaml"} & {path.name for path in (tmp_path / "set").iterdir()}
+    both = wallkit("dataset", "from-log", "run3/log.mcap", logs / "run1/log.mcap", "-o", "both")
+    assert "9 pictures have no labels" in both.err
+
+
 @pytest.mark.parametrize(
     ("drops", "said"),
     [

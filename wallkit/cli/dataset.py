@@ -93,5 +93,8 @@ def from_log(
     click.echo(f"dropped  {counted['dropped']}")
     has = f"{done.labelled} with labels, {done.posed} with a pose; {done.augmented} augmented"
     click.echo(f"written  {done.written} pictures, {has}")
+    if 0 < done.labelled < done.written:
+        missing = done.written - done.labelled
+        common.warn(f"{missing} pictures have no labels, and YOLO takes them for empty: make two sets", quiet=quiet)
     if len(logs) == 1 and val > 0:
         common.warn("one log cannot be split: there is nothing to validate on", quiet=quiet)

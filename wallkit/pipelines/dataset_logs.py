@@ -74,7 +74,10 @@ class Source:
 
     @cached_property
     def oracle_classes(self) -> list[str]:
-        """Names of the numbers in oracle labels; none in a real log."""
+        """Names of the numbers in oracle labels; none in a real log, or one whose cameras have no masks."""
+        wanted = {f"{_ORACLE}{camera_of_topic(topic)}/classes" for topic in self.topics}
+        if not wanted & {channel.topic for channel in self.log.channels}:
+            return []
         for message in self.log.first(f"{_ORACLE}names"):
             return list(json.loads(str(message.value))["classes"])
         return []
