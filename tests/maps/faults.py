@@ -115,7 +115,7 @@ def lacking(tag: str, attribute: str) -> Breaker:
         element = _one(rng, [e for e in _all(document, tag) if e.get(attribute)])
         if element is None:
             return None
-        span = element.attribute(attribute).span  # type: ignore[union-attr]
+        span = element.attribute(attribute).span
         return [Edit(span.offset, span.end - span.offset, b"")]
 
     return breaker
@@ -175,7 +175,7 @@ def door(tag: str, attribute: str, change: Callable[[list[float], np.random.Gene
         joint = _one(rng, hinges)
         if joint is None:
             return None
-        link = next(e for e in _links(document, "door") if e.get("name") == joint.find("child").get("link"))  # type: ignore[union-attr]
+        link = next(e for e in _links(document, "door") if e.get("name") == joint.find("child").get("link"))
         where = joint.find(tag) or next(e for e in link.iter() if e.tag == tag)
         return [_set(where, attribute, change(_numbers(where, attribute), rng))]
 
@@ -227,13 +227,13 @@ def same_name(tag: str) -> Breaker:
 
 def circle(rng: np.random.Generator, document: Document) -> Edits:
     """A wall hangs on what hangs on it."""
-    joints = [j for j in _all(document, "joint") if j.find("parent").get("link") not in ("map", None)]  # type: ignore[union-attr]
+    joints = [j for j in _all(document, "joint") if j.find("parent").get("link") not in ("map", None)]
     joint = _one(rng, joints)
     if joint is None:
         return None
-    wall, child = joint.find("parent").get("link"), joint.find("child").get("link")  # type: ignore[union-attr]
-    above = next(j for j in _all(document, "joint") if j.find("child").get("link") == wall)  # type: ignore[union-attr]
-    return [_set(above.find("parent"), "link", child or "")]  # type: ignore[arg-type]
+    wall, child = joint.find("parent").get("link"), joint.find("child").get("link")
+    above = next(j for j in _all(document, "joint") if j.find("child").get("link") == wall)
+    return [_set(above.find("parent"), "link", child or "")]
 
 
 def orphan(rng: np.random.Generator, document: Document) -> Edits:
@@ -337,7 +337,7 @@ def hinge_inside(rng: np.random.Generator, document: Document) -> Edits:
     joint = _one(rng, [j for j in _all(document, "joint") if j.get("type") == "revolute"])
     if joint is None:
         return None
-    name = joint.find("child").get("link")  # type: ignore[union-attr]
+    name = joint.find("child").get("link")
     leaf = next(link for link in _links(document, "door") if link.get("name") == name)
     edits = []
     for origin in (joint.find("origin"), next(e for e in leaf.iter() if e.tag == "origin")):
@@ -382,8 +382,8 @@ def same_room(rng: np.random.Generator, document: Document) -> Edits:
     leaf = _one(rng, _links(document, "door"))
     assert leaf is not None
     said = leaf.find(wk("object"))
-    room = (said.get("connects") or "").split()[1]  # type: ignore[union-attr]
-    return [_set(said, "connects", f"{room} {room}")]  # type: ignore[arg-type]
+    room = (said.get("connects") or "").split()[1]
+    return [_set(said, "connects", f"{room} {room}")]
 
 
 def other_room(rng: np.random.Generator, document: Document) -> Edits:
@@ -392,9 +392,9 @@ def other_room(rng: np.random.Generator, document: Document) -> Edits:
     assert leaf is not None
     said = leaf.find(wk("object"))
     rooms = [room.get("id") or "" for room in _all(document, wk("room"))]
-    right = (said.get("connects") or "").split()  # type: ignore[union-attr]
+    right = (said.get("connects") or "").split()
     wrong = str(rng.choice([room for room in rooms if room not in right]))
-    return [_set(said, "connects", f"{right[0]} {wrong}")]  # type: ignore[arg-type]
+    return [_set(said, "connects", f"{right[0]} {wrong}")]
 
 
 def _typo(text: str, rng: np.random.Generator) -> str:
@@ -424,7 +424,7 @@ FAULTS: dict[str, tuple[str, Breaker]] = {
     "tag not closed": ("WK-X001", unclosed),
     "prefix not declared": ("WK-X002", within("link", '<wq:object class="wall"/>')),
     "latin-1 byte": ("WK-X003", before("link", b"<!-- caf\xe9 -->")),
-    "doctype": ("WK-X010", lambda rng, d: [_insert(d.root.offset, '<!DOCTYPE robot [<!ENTITY a "1">]>')]),  # type: ignore[union-attr]
+    "doctype": ("WK-X010", lambda rng, d: [_insert(d.root.offset, '<!DOCTYPE robot [<!ENTITY a "1">]>')]),
     "instruction in the tree": ("WK-X012", within("link", "<?php echo 1 ?>")),
     "wk element misplaced": ("WK-S010", within("joint", '<wk:room id="r" floor="0 0 1 0 1 1"/>')),
     "wk element misspelled": ("WK-S011", within("link", '<wk:objekt class="wall"/>')),
