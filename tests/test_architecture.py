@@ -12,7 +12,7 @@ import pytest
 import wallkit
 
 PACKAGE = Path(wallkit.__file__).parent
-ROOMS = ("logs", "maps", "calib", "points", "localize", "evaluate", "simulate", "dataset", "report")
+ROOMS = ("logs", "maps", "calib", "segment", "points", "localize", "evaluate", "simulate", "dataset", "report")
 HEAVY = {
     "cv2",
     "onnxruntime",

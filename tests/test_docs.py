@@ -43,7 +43,7 @@ PAGES = sorted(
     for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("maps/*.md"), *ROOT.glob("calib/*.md"))
     if path.is_file()
 )
-SETTING = re.compile(r"`((?:logs|maps|points|localize|evaluate|results)\.[a-z_0-9.]+)`|--set ([a-z_0-9.]+)=")
+SETTING = re.compile(r"`((?:logs|maps|segment|points|localize|evaluate|results)\.[a-z_0-9.]+)`|--set ([a-z_0-9.]+)=")
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 WALLKIT = f'exec "{sys.executable}" -c "from wallkit.cli.app import main; main()" "$@"'
 

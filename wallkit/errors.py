@@ -43,6 +43,10 @@ class CalibrationError(WallkitError):
     """A camera model, board, capture or calibration file that cannot be read or used."""
 
 
+class ModelError(WallkitError):
+    """A segmentation model that cannot be read, or does not do what is asked of it."""
+
+
 class SimulationError(WallkitError):
     """A world, robot or scenario that cannot be simulated."""
 

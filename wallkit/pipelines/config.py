@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from wallkit.maps.rules.tolerances import Tolerances
 from wallkit.pipelines.evaluate import EvaluateSettings
 from wallkit.pipelines.recorder import ResultSettings
 from wallkit.points.filters import PointsSettings
+from wallkit.segment.settings import SegmentSettings
 
 DEFAULT_FILE = Path("wallkit.toml")
 
@@ -29,6 +30,7 @@ class Config:
     maps: MapsSettings = section(MapsSettings, "how maps become fields")
     rules: Tolerances = section(Tolerances, "where the rules of `wallkit map validate` draw the line")
     audit: AuditSettings = section(AuditSettings, "how `wallkit map audit` compares a map with a log")
+    segment: SegmentSettings = section(SegmentSettings, "what the camera sees")
     points: PointsSettings = section(PointsSettings, "which returns are trusted")
     localize: LocalizeSettings = section(LocalizeSettings, "the filter")
     evaluate: EvaluateSettings = section(EvaluateSettings, "when an estimate is right or wrong")
@@ -57,7 +59,7 @@ def load_config(path: Path | None, words: Sequence[str] = (), flags: dict[str, A
         path = DEFAULT_FILE
     sources: list[Source] = []
     if path is not None:
-        sources.append(_with_map_beside(read_toml(path), path))
+        sources.append(_with_files_beside(read_toml(path), path))
     sources.append(source_from_words(words))
     for key, (value, flag) in (flags or {}).items():
         if value is not None:
@@ -66,12 +68,19 @@ def load_config(path: Path | None, words: Sequence[str] = (), flags: dict[str, A
     return LoadedConfig(config, origins, path)
 
 
-def _with_map_beside(source: Source, path: Path) -> Source:
-    """The source with its map named from here, not from the file's folder."""
-    name = source.table.get("map")
+def _with_files_beside(source: Source, path: Path) -> Source:
+    """The source with its map and model named from here, not from the file's folder."""
+    table = _beside(source.table, "map", path)
+    if isinstance(table.get("segment"), dict):
+        table = {**table, "segment": _beside(table["segment"], "model", path)}
+    return replace(source, table=table)
+
+
+def _beside(table: Mapping[str, Any], key: str, path: Path) -> dict[str, Any]:
+    name = table.get(key)
     if not isinstance(name, str) or not name or Path(name).is_absolute():
-        return source
-    return replace(source, table={**source.table, "map": str(path.parent / name)})
+        return dict(table)
+    return {**table, key: str(path.parent / name)}
 
 
 def _source_of_flag(key: str, value: Any, flag: str) -> Source:
