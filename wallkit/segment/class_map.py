@@ -69,7 +69,7 @@ def nearest_cells(pixels: ArrayLike, shape: tuple[int, int]) -> tuple[Int64Array
     """(K,) row, column and whether it is on the image, of pixels (K, 2); those that are not have row and column 0."""
     at = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
     with np.errstate(invalid="ignore"):
-        inside: BoolArray = ((at >= -0.5) & (at < (shape[1] - 0.5, shape[0] - 0.5))).all(axis=1)
+        inside = np.asarray(((at >= -0.5) & (at < (shape[1] - 0.5, shape[0] - 0.5))).all(axis=1))
     columns, rows = np.floor(np.where(inside[:, None], at, 0) + 0.5).astype(np.int64).T
     return rows, columns, inside
 
