@@ -12,7 +12,7 @@ from tests.e2e.conftest import Done
 from tests.maps.drawn import box, placed, robot
 from tests.maps.flat import flat_draft
 from wallkit.cli.app import main
-from wallkit.maps.draft_write import write_draft
+from wallkit.maps.draft.write import write_draft
 
 HEADER = '<wk:map format="1.0" units="m rad" level="1" scan_plane="0.3">{}</wk:map>'
 ROOM = '<wk:room id="hall" kind="hall" floor="0 0 4 0 4 3 0 3"/>'

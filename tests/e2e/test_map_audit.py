@@ -11,7 +11,7 @@ from tests.maps.audit_worlds import FLOOR, ROUTE, Z_M, map_of, with_wall
 from wallkit.core.geometry import matrix_from_pose
 from wallkit.core.types import Odometry, StampedPose, Transform
 from wallkit.logs.writer import McapWriter
-from wallkit.maps.draft_write import write_draft
+from wallkit.maps.draft.write import write_draft
 from wallkit.maps.geometry import slice_at
 from wallkit.maps.importers import ImportOptions, import_map
 from wallkit.simulate.drive import OdometryNoise, follow, odometry_from

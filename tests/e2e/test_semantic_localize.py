@@ -11,8 +11,8 @@ import pytest
 from wallkit.core.geometry import matrix_from_pose
 from wallkit.core.types import Odometry, StampedPose, Transform
 from wallkit.logs.writer import McapWriter
-from wallkit.maps.draft import Draft, DraftFixture, DraftWall
-from wallkit.maps.draft_write import write_draft
+from wallkit.maps.draft.draft import Draft, DraftFixture, DraftWall
+from wallkit.maps.draft.write import write_draft
 from wallkit.maps.geometry import slice_at
 from wallkit.maps.importers import ImportOptions, import_map
 from wallkit.maps.read import load_map

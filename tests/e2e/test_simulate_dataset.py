@@ -13,7 +13,7 @@ from tests.simulate.conftest import gl
 from wallkit.dataset.labels import classes_from_png
 from wallkit.dataset.polygons import mask_from_polygons, polygons_from_yolo
 from wallkit.dataset.rle import counts_from_text, mask_from_counts
-from wallkit.maps.draft_write import write_draft
+from wallkit.maps.draft.write import write_draft
 from wallkit.maps.rules import validate
 from wallkit.pipelines.simulate_buildings import random_building
 

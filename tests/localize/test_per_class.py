@@ -13,8 +13,8 @@ from wallkit.core.geometry import compose, wrap_angle
 from wallkit.core.types import BeamLabels, Frame
 from wallkit.localize.class_conditional import ClassConditional
 from wallkit.localize.per_class import PerClass
+from wallkit.maps.grids.semantic_fields import fields_from_map
 from wallkit.maps.read import read_map
-from wallkit.maps.semantic_fields import fields_from_map
 from wallkit.maps.xml import parse
 from wallkit.points.labels import labelled_scan
 from wallkit.simulate.plan import plan_from_polylines

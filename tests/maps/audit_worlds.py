@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from wallkit.core.geometry import compose
-from wallkit.maps.audit_nouns import Logged
-from wallkit.maps.draft import Draft, DraftFixture, DraftOpening, DraftRoom, DraftWall
-from wallkit.maps.draft_doors import DraftDoor
-from wallkit.maps.draft_write import write_draft
+from wallkit.maps.audit.nouns import Logged
+from wallkit.maps.draft.doors import DraftDoor
+from wallkit.maps.draft.draft import Draft, DraftFixture, DraftOpening, DraftRoom, DraftWall
+from wallkit.maps.draft.write import write_draft
 from wallkit.maps.geometry import slice_at
 from wallkit.maps.model import SemanticMap
 from wallkit.maps.read import read_map

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from wallkit.maps.draft import Draft, DraftFixture, DraftOpening, DraftOrigin, DraftPane, DraftRoom, DraftWall
-from wallkit.maps.draft_doors import DraftDoor
-from wallkit.maps.draft_write import write_draft
+from wallkit.maps.draft.doors import DraftDoor
+from wallkit.maps.draft.draft import Draft, DraftFixture, DraftOpening, DraftOrigin, DraftPane, DraftRoom, DraftWall
+from wallkit.maps.draft.write import write_draft
 from wallkit.maps.model import SemanticMap
 from wallkit.maps.read import read_map
 from wallkit.maps.xml import parse

@@ -7,7 +7,7 @@ import math
 import shapely
 
 from wallkit.maps.document import apply_edits
-from wallkit.maps.draft import DraftOpening
+from wallkit.maps.draft.draft import DraftOpening
 from wallkit.maps.edit.cut import cut
 from wallkit.maps.edit.walls import split
 from wallkit.maps.geometry import parts

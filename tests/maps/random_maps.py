@@ -7,9 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from wallkit.maps.draft import Draft, DraftFixture, DraftOpening, DraftPane, DraftRoom, DraftWall
-from wallkit.maps.draft_doors import DraftDoor
-from wallkit.maps.draft_write import write_draft
+from wallkit.maps.draft.doors import DraftDoor
+from wallkit.maps.draft.draft import Draft, DraftFixture, DraftOpening, DraftPane, DraftRoom, DraftWall
+from wallkit.maps.draft.write import write_draft
 
 THICK_M = 0.12
 # (deep, wide, high), underside above the floor; what hangs on a wall

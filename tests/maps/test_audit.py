@@ -10,13 +10,13 @@ import pytest
 
 from tests.maps.audit_worlds import FLOOR, SIGMA_M, WALLS, Z_M, logged_in, map_of, scaled, with_wall, without
 from wallkit.errors import ConfigError
-from wallkit.maps.audit import evidence_of
-from wallkit.maps.audit_draw import draw_audit
+from wallkit.maps.audit.audit import evidence_of
+from wallkit.maps.audit.draw import draw_audit
 from wallkit.maps.document import apply_edits
-from wallkit.maps.draft import DraftWall
-from wallkit.maps.draft_write import write_draft
+from wallkit.maps.draft.draft import DraftWall
+from wallkit.maps.draft.write import write_draft
+from wallkit.maps.draw.svg import svg_from_drawing
 from wallkit.maps.read import read_map
-from wallkit.maps.render_svg import svg_from_drawing
 from wallkit.maps.rules import RULES, audit_against, explain, validate
 from wallkit.maps.rules.tolerances import Tolerances
 from wallkit.maps.xml import parse

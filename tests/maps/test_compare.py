@@ -9,7 +9,7 @@ import pytest
 
 from tests.maps.drawn import box, placed, ring, robot
 from wallkit.maps.canonical import canonical
-from wallkit.maps.compare import compare_maps
+from wallkit.maps.diff.compare import compare_maps
 from wallkit.maps.read import read_map
 from wallkit.maps.xml import parse
 

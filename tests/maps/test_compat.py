@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from tests.maps.drawn import box, placed, ring, robot
-from wallkit.maps.compat import views_of
 from wallkit.maps.document import apply_edits
+from wallkit.maps.findings.compat import views_of
 from wallkit.maps.rules import validate
 from wallkit.maps.rules.tolerances import Tolerances
 from wallkit.pipelines.map import Selection

@@ -15,10 +15,10 @@ from shapely.geometry import LineString, Polygon
 
 from wallkit.errors import MapError
 from wallkit.maps.classes import ClassInfo
-from wallkit.maps.draft import Draft, DraftFixture, DraftOpening, DraftOrigin, DraftPane, DraftRoom, DraftWall
-from wallkit.maps.draft_doors import CLEARANCE_M, DraftDoor
-from wallkit.maps.draft_joints import end_closures
-from wallkit.maps.draft_write import write_draft
+from wallkit.maps.draft.doors import CLEARANCE_M, DraftDoor
+from wallkit.maps.draft.draft import Draft, DraftFixture, DraftOpening, DraftOrigin, DraftPane, DraftRoom, DraftWall
+from wallkit.maps.draft.joints import end_closures
+from wallkit.maps.draft.write import write_draft
 
 DOOR = DraftOpening("d1", "door", (1.0, 1.9), (0.0, 2.1), DraftDoor("door_1"))
 

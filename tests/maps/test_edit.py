@@ -13,7 +13,7 @@ from tests.maps.floor import CUT, FLOOR, JUDGED, P1, SPLIT, context_of, done
 from wallkit.errors import MapError
 from wallkit.maps.classes import ClassInfo
 from wallkit.maps.document import apply_edits
-from wallkit.maps.draft import DraftOpening, DraftWall
+from wallkit.maps.draft.draft import DraftOpening, DraftWall
 from wallkit.maps.edit import place, snap
 from wallkit.maps.edit.add import add_class, add_fixture, add_room, add_wall
 from wallkit.maps.edit.add_openings import DoorWords, Place, add_door

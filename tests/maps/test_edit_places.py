@@ -14,7 +14,7 @@ from tests.maps.drawn import HEAD
 from tests.maps.floor import FLOOR, JUDGED, context_of, differ_m2, done, pose
 from wallkit.errors import MapError
 from wallkit.maps.classes import ClassInfo
-from wallkit.maps.draft import DraftWall
+from wallkit.maps.draft.draft import DraftWall
 from wallkit.maps.edit import snap
 from wallkit.maps.edit.add import add_class, add_fixture, add_room, add_wall
 from wallkit.maps.edit.add_openings import DoorWords, Place, add_door

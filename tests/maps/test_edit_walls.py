@@ -9,7 +9,7 @@ import shapely
 
 from tests.maps.floor import CUT, FLOOR, JUDGED, SPLIT, context_of, differ_m2, done, pose, solid
 from wallkit.errors import MapError
-from wallkit.maps.draft import DraftOpening
+from wallkit.maps.draft.draft import DraftOpening
 from wallkit.maps.edit import cut as cutting
 from wallkit.maps.edit import place
 from wallkit.maps.edit.add_openings import DoorWords, Place, add_door

@@ -114,7 +114,7 @@ def test_what_a_format_cannot_say_is_counted_in_words():
 
 
 def test_the_drawing_is_the_one_that_map_show_makes():
-    from wallkit.maps.render import PlanSettings, plan_svg
+    from wallkit.maps.draw.plan import PlanSettings, plan_svg
 
     (data,) = export_map(flat(), Path("a.svg"), ExportOptions(z_m=0.3)).files.values()
     assert data == plan_svg(flat(), PlanSettings(z_m=0.3))
@@ -129,7 +129,7 @@ def test_fields_say_what_they_are_and_are_the_localizers_own(tmp_path):
     import cv2
     import numpy as np
 
-    from wallkit.maps.semantic_fields import fields_from_map
+    from wallkit.maps.grids.semantic_fields import fields_from_map
 
     drawn = flat()
     files = export_map(drawn, tmp_path, ExportOptions(cell_m=0.05), format_name="fields").files

@@ -12,7 +12,7 @@ import shapely
 
 from tests.maps.flat import AT_M, DEEP_M, ORIGIN, THICK_M, flat
 from wallkit.errors import MapError
-from wallkit.maps.draft import DraftOrigin
+from wallkit.maps.draft.draft import DraftOrigin
 from wallkit.maps.exporters import ExportOptions, export_map
 from wallkit.maps.exporters.utm import lonlat_from_utm, utm_zone
 from wallkit.maps.geometry import parts

@@ -13,7 +13,7 @@ from lxml import etree
 from tests.maps.drawn import box, placed, robot, wall
 from tests.maps.flat import flat
 from wallkit.maps.document import WK_NAMESPACE
-from wallkit.maps.draft_doors import DraftDoor
+from wallkit.maps.draft.doors import DraftDoor
 from wallkit.maps.exporters import ExportOptions, export_map
 from wallkit.maps.exporters.sdf import rpy_from_rotation
 from wallkit.maps.model import SemanticMap

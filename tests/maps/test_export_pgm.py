@@ -8,11 +8,11 @@ import shapely
 
 from tests.maps.flat import AT_M, DEEP_M, THICK_M, WIDE_M, flat
 from wallkit.errors import MapError
-from wallkit.maps.draft_write import write_draft
+from wallkit.maps.draft.write import write_draft
 from wallkit.maps.exporters import ExportOptions, export_map
 from wallkit.maps.geometry import parts, slice_parts
+from wallkit.maps.grids.raster import read_raster
 from wallkit.maps.importers import ImportOptions, import_map
-from wallkit.maps.raster import read_raster
 from wallkit.maps.read import load_map, read_map
 from wallkit.maps.surfaces import floor_at, surfaces_at
 from wallkit.maps.xml import parse

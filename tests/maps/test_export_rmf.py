@@ -11,7 +11,7 @@ import pytest
 from tests.maps.drawn import box, placed, robot, wall
 from tests.maps.flat import AT_M, DEEP_M, WIDE_M, flat, flat_draft, map_of
 from wallkit.errors import MapError
-from wallkit.maps.draft_doors import DraftDoor
+from wallkit.maps.draft.doors import DraftDoor
 from wallkit.maps.exporters import ExportOptions, export_map
 from wallkit.maps.importers import ImportOptions, import_map
 from wallkit.maps.read import read_map
@@ -82,7 +82,7 @@ def test_a_second_time_changes_nothing(tmp_path):
 
 def test_slanted_and_crossing_walls_come_back_at_their_points(tmp_path):
     """A star of three walls, a bend of 20 degrees, a T at 60 degrees: the drawn points, whatever the boxes did."""
-    from wallkit.maps.draft import Draft, DraftWall
+    from wallkit.maps.draft.draft import Draft, DraftWall
 
     def at(angle_deg, length_m):
         return (length_m * math.cos(math.radians(angle_deg)), length_m * math.sin(math.radians(angle_deg)))

@@ -7,7 +7,7 @@ import pytest
 
 from wallkit.core.types import OccupancyGrid
 from wallkit.errors import MapError
-from wallkit.maps.fields import distance_to, fields_from_grid, visible_surface
+from wallkit.maps.grids.fields import distance_to, fields_from_grid, visible_surface
 
 
 def grid_of(drawing, resolution_m=0.1):

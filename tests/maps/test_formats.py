@@ -16,10 +16,10 @@ from tests.maps.drawn import HEAD, box, placed, robot
 from wallkit.cli import common
 from wallkit.cli.map import validate as validate_command
 from wallkit.maps.document import Document, Edit, apply_edits
-from wallkit.maps.formats import DOCUMENTS, TEXTS, github_from, json_from, junit_from
-from wallkit.maps.formats_sarif import LEVELS, sarif_from
-from wallkit.maps.formats_text import WIDTH, marked_line, printable, text_from
-from wallkit.maps.judged import Judged
+from wallkit.maps.findings.formats import DOCUMENTS, TEXTS, github_from, json_from, junit_from
+from wallkit.maps.findings.judged import Judged
+from wallkit.maps.findings.sarif import LEVELS, sarif_from
+from wallkit.maps.findings.text import WIDTH, marked_line, printable, text_from
 from wallkit.maps.rules import RULES, validate
 from wallkit.maps.xml import parse
 

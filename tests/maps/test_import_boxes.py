@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wallkit.errors import MapError
-from wallkit.maps.draft_write import write_draft
+from wallkit.maps.draft.write import write_draft
 from wallkit.maps.importers.boxes import COLUMNS, read_boxes
 from wallkit.maps.importers.imported import ImportOptions
 

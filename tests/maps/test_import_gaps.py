@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wallkit.core.geometry import transform_points
-from wallkit.maps.draft import DraftWall
+from wallkit.maps.draft.draft import DraftWall
 from wallkit.maps.importers.fixtures import place_fixture
 from wallkit.maps.importers.gaps import find_gaps, find_misses, find_near_duplicates
 

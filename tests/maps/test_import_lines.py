@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from wallkit.errors import MapError
-from wallkit.maps.draft_write import write_draft
-from wallkit.maps.fields import OCCUPIED_FROM, distance_to
+from wallkit.maps.draft.write import write_draft
+from wallkit.maps.grids.fields import OCCUPIED_FROM, distance_to
+from wallkit.maps.grids.raster import read_raster
 from wallkit.maps.importers import import_map, recognise
 from wallkit.maps.importers.imported import ImportOptions
 from wallkit.maps.importers.lines import read_lines
-from wallkit.maps.raster import read_raster
 
 
 def lines(tmp_path, *features):

@@ -10,7 +10,7 @@ import pytest
 
 from wallkit.core.geometry import invert, transform_points
 from wallkit.errors import MapError
-from wallkit.maps.draft_write import placed_walls, write_draft
+from wallkit.maps.draft.write import placed_walls, write_draft
 from wallkit.maps.importers import recognise
 from wallkit.maps.importers.imported import ImportOptions
 from wallkit.maps.importers.raster import read_map_raster

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from wallkit.errors import MapError
-from wallkit.maps.draft_write import write_draft
+from wallkit.maps.draft.write import write_draft
 from wallkit.maps.importers import import_map, recognise
 from wallkit.maps.importers.imported import ImportOptions
 from wallkit.maps.importers.rmf import read_rmf

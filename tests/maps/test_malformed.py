@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from wallkit.maps.repair import repair
+from wallkit.maps.findings.repair import repair
 from wallkit.maps.rules import RULES, validate
 
 # errors that a fault brings with it, and why they are its own

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from tests.maps.drawn import box, placed, ring, robot
 from wallkit.errors import MapError
 from wallkit.maps.canonical import canonical
-from wallkit.maps.compare import compare_maps
-from wallkit.maps.compare_links import Side, renamed_links
-from wallkit.maps.merge import meaning, merge_maps
-from wallkit.maps.merge_names import Names, renamed
+from wallkit.maps.diff.compare import compare_maps
+from wallkit.maps.diff.links import Side, renamed_links
+from wallkit.maps.diff.merge import meaning, merge_maps
+from wallkit.maps.diff.merge_names import Names, renamed
 from wallkit.maps.read import read_map
 from wallkit.maps.xml import parse
 

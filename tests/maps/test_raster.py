@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from wallkit.errors import MapError
-from wallkit.maps.raster import read_raster
+from wallkit.maps.grids.raster import read_raster
 
 GOOD = {
     "image": "map.png",

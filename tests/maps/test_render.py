@@ -13,15 +13,15 @@ import shapely
 
 from tests.maps.drawn import box, placed, ring, robot
 from wallkit.errors import MapError
+from wallkit.maps.draw.findings import MOST_MARKED
+from wallkit.maps.draw.marks import Area, Text
+from wallkit.maps.draw.plan import PlanSettings, class_style, draw_plan, plan_svg
+from wallkit.maps.draw.png import png_from_drawing
+from wallkit.maps.draw.svg import svg_from_drawing
+from wallkit.maps.draw.symbols import FURNITURE, SYMBOLS, symbol_of
+from wallkit.maps.draw.text import cells_of, coloured_from_cells, plain_from_cells
 from wallkit.maps.geometry import parts, slice_at
 from wallkit.maps.read import read_map
-from wallkit.maps.render import PlanSettings, class_style, draw_plan, plan_svg
-from wallkit.maps.render_findings import MOST_MARKED
-from wallkit.maps.render_marks import Area, Text
-from wallkit.maps.render_png import png_from_drawing
-from wallkit.maps.render_svg import svg_from_drawing
-from wallkit.maps.render_symbols import FURNITURE, SYMBOLS, symbol_of
-from wallkit.maps.render_text import cells_of, coloured_from_cells, plain_from_cells
 from wallkit.maps.rules import validate
 from wallkit.maps.xml import parse
 

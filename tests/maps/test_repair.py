@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from tests.maps.drawn import HEAD, box, placed, robot
-from wallkit.maps import repair as repair_module
 from wallkit.maps.document import Edit
-from wallkit.maps.repair import CLASSES, repair
+from wallkit.maps.findings import repair as repair_module
+from wallkit.maps.findings.repair import CLASSES, repair
 from wallkit.maps.rules import RULES, validate
 from wallkit.maps.rules.base import Problem, Rule
 from wallkit.maps.rules.docs import doc_of, file_from_example, is_file

@@ -10,14 +10,14 @@ import shapely
 
 from tests.maps.drawn import box, placed, ring, robot
 from wallkit.errors import MapError
-from wallkit.maps.rivals import CONTINUUM
 from wallkit.maps.rules import validate
 from wallkit.maps.rules.base import Context
 from wallkit.maps.rules.outlook import world as world_of
 from wallkit.maps.rules.tolerances import Tolerances
-from wallkit.maps.score import score
+from wallkit.maps.score.rivals import CONTINUUM
+from wallkit.maps.score.score import score
+from wallkit.maps.score.world import ScoreSettings, World
 from wallkit.maps.sight import cast_beams, index_segments
-from wallkit.maps.world import ScoreSettings, World
 from wallkit.maps.xml import parse
 from wallkit.pipelines.map_score import probe_map
 

@@ -11,9 +11,9 @@ from wallkit.core.grid import distances_at
 from wallkit.core.grid import placed as placed_in
 from wallkit.core.raycast import cast_rays
 from wallkit.errors import MapError
-from wallkit.maps.fields import MapsSettings, fields_from_grid
+from wallkit.maps.grids.fields import MapsSettings, fields_from_grid
+from wallkit.maps.grids.semantic_fields import SIGMA_M, distances_to_segments, fields_from_map
 from wallkit.maps.read import read_map
-from wallkit.maps.semantic_fields import SIGMA_M, distances_to_segments, fields_from_map
 from wallkit.maps.surfaces import floor_at, surfaces_at
 from wallkit.maps.xml import parse
 from wallkit.pipelines.maps import load_map

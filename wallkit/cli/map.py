@@ -23,7 +23,7 @@ from wallkit.cli.map_slice import compat, slice_
 from wallkit.cli.map_walls import cut, fill, join, snap, split
 
 if TYPE_CHECKING:
-    from wallkit.maps.judged import Judged
+    from wallkit.maps.findings.judged import Judged
     from wallkit.pipelines.map import RepairedFile, Selection
 
 FILES = click.argument("files", nargs=-1, type=click.Path(path_type=Path), metavar="[FILE]...")
@@ -98,7 +98,7 @@ def validate(
     """
     from dataclasses import replace
 
-    from wallkit.maps.formats_text import counted
+    from wallkit.maps.findings.text import counted
     from wallkit.maps.labels import read_labels
     from wallkit.pipelines import map as pipeline
 
@@ -239,8 +239,8 @@ def _words(values: tuple[str, ...]) -> list[str]:
 def _print_judged(judged: Sequence[Judged], format_name: str, color: str) -> None:
     import json
 
-    from wallkit.maps.formats import DOCUMENTS, TEXTS
-    from wallkit.maps.formats_text import text_from
+    from wallkit.maps.findings.formats import DOCUMENTS, TEXTS
+    from wallkit.maps.findings.text import text_from
 
     if format_name == "json":
         common.emit(DOCUMENTS["json"](judged))
@@ -255,7 +255,7 @@ def _print_judged(judged: Sequence[Judged], format_name: str, color: str) -> Non
 
 def _say_fixed(file: RepairedFile, *, dry_run: bool) -> None:
     """What was repaired, and what is left; on stderr where stdout is the patch."""
-    from wallkit.maps.formats_text import counted
+    from wallkit.maps.findings.text import counted
 
     would = "would be fixed" if dry_run else "fixed"
     for finding in file.fixed:

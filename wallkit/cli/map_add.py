@@ -102,7 +102,7 @@ def wall(
     Examples:
       wallkit map add wall floor2.wkmap.urdf wall_x --from 2.5,0 --to 2.5,2
     """
-    from wallkit.maps.draft import DraftWall
+    from wallkit.maps.draft.draft import DraftWall
     from wallkit.maps.edit.add import add_wall
     from wallkit.pipelines.map_edit import edit_file
 

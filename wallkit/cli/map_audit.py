@@ -11,7 +11,7 @@ from wallkit.cli import common
 from wallkit.cli.localize import topic_options, wanted_from_flags
 
 if TYPE_CHECKING:
-    from wallkit.maps.audit_nouns import ElementEvidence
+    from wallkit.maps.audit.nouns import ElementEvidence
     from wallkit.pipelines.map_audit import Audit
 
 COLORS = {"error": "red", "warning": "yellow", "info": "cyan"}
@@ -120,8 +120,8 @@ def _words(values: tuple[str, ...]) -> list[str]:
 def _print(done: Audit, format_name: str, flags: dict[str, Any]) -> None:
     import json
 
-    from wallkit.maps.formats import DOCUMENTS, TEXTS
-    from wallkit.maps.formats_text import text_from
+    from wallkit.maps.findings.formats import DOCUMENTS, TEXTS
+    from wallkit.maps.findings.text import text_from
 
     judged = [done.judged]
     if format_name == "json":

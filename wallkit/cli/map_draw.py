@@ -62,8 +62,8 @@ def show(
       wallkit map show floor2.wkmap.urdf -o seen.png --z lidar
       wallkit map show floor2.wkmap.urdf -o wrong.svg --findings --overwrite
     """
-    from wallkit.maps.render import PlanSettings
-    from wallkit.maps.render_findings import MOST_MARKED
+    from wallkit.maps.draw.findings import MOST_MARKED
+    from wallkit.maps.draw.plan import PlanSettings
     from wallkit.pipelines import map_draw as pipeline
 
     if out is not None:
@@ -102,7 +102,7 @@ def _print_preview(semantic_map: SemanticMap, z_m: float | None, color: str) -> 
     """Half blocks where the terminal has colours, letters elsewhere."""
     import shutil
 
-    from wallkit.maps.render_text import cells_of, coloured_from_cells, plain_from_cells
+    from wallkit.maps.draw.text import cells_of, coloured_from_cells, plain_from_cells
 
     size = shutil.get_terminal_size((100, 40))
     columns, lines = max(20, min(size.columns - 1, 110)), max(12, min(size.lines - 4, 50))

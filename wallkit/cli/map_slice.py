@@ -52,9 +52,9 @@ def slice_(
       wallkit map slice floor2.wkmap.urdf --z 0.85 -o seen.svg
       wallkit map slice floor2.wkmap.urdf --z 1.5 --json | jq '.out[].link'
     """
+    from wallkit.maps.draw.plan import PlanSettings
     from wallkit.maps.plane import view_at
     from wallkit.maps.read import load_map
-    from wallkit.maps.render import PlanSettings
     from wallkit.pipelines import map_draw
 
     if out is not None:
@@ -196,7 +196,7 @@ _SAID = {"loads": "loads it", "differs": "loads something else", "refuses": "ref
 
 
 def _compat_lines(found: Compat) -> list[str]:
-    from wallkit.maps.formats_text import text_from
+    from wallkit.maps.findings.text import text_from
 
     lines = []
     for view in found.views:

@@ -10,8 +10,8 @@ from typing import Any
 from wallkit.core.config import Source, build, read_toml, section, setting, source_from_words
 from wallkit.localize.settings import LocalizeSettings
 from wallkit.logs.sync import SyncConfig
-from wallkit.maps.audit_settings import AuditSettings
-from wallkit.maps.fields import MapsSettings
+from wallkit.maps.audit.settings import AuditSettings
+from wallkit.maps.grids.fields import MapsSettings
 from wallkit.maps.rules.tolerances import Tolerances
 from wallkit.pipelines.evaluate import EvaluateSettings
 from wallkit.pipelines.recorder import ResultSettings

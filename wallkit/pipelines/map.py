@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from wallkit.errors import MapError
-from wallkit.maps.judged import Judged
+from wallkit.maps.findings.judged import Judged
+from wallkit.maps.findings.repair import repair
 from wallkit.maps.labels import Labels
-from wallkit.maps.repair import repair
 from wallkit.maps.rules import PROFILES, validate
 from wallkit.maps.rules.base import FixClass, MapFinding
 from wallkit.maps.rules.tolerances import Tolerances

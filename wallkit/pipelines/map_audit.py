@@ -19,13 +19,13 @@ from wallkit.logs.rig import Rig, Wanted, find_rig
 from wallkit.logs.sync import synchronise
 from wallkit.logs.topics import pick_truth
 from wallkit.logs.trajectories import trajectory_of
-from wallkit.maps.audit import evidence_of
-from wallkit.maps.audit_nouns import Evidence, Logged
-from wallkit.maps.audit_settings import AuditSettings
-from wallkit.maps.judged import Judged
+from wallkit.maps.audit.audit import evidence_of
+from wallkit.maps.audit.nouns import Evidence, Logged
+from wallkit.maps.audit.settings import AuditSettings
+from wallkit.maps.findings.judged import Judged
+from wallkit.maps.grids.semantic_fields import height_m
 from wallkit.maps.read import load_map
 from wallkit.maps.rules import audit_against
-from wallkit.maps.semantic_fields import height_m
 from wallkit.pipelines.config import Config
 from wallkit.pipelines.localize import Request, localize, prepare
 from wallkit.pipelines.map import write_whole
@@ -256,9 +256,9 @@ def write_picture(out: Path, done: Audit) -> None:
     Raises:
         OutputError: it cannot be written.
     """
-    from wallkit.maps.audit_draw import draw_audit
-    from wallkit.maps.render_png import png_from_drawing
-    from wallkit.maps.render_svg import svg_from_drawing
+    from wallkit.maps.audit.draw import draw_audit
+    from wallkit.maps.draw.png import png_from_drawing
+    from wallkit.maps.draw.svg import svg_from_drawing
 
     report = done.judged.report
     if report.map is None:

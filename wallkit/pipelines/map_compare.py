@@ -10,11 +10,11 @@ from typing import Literal
 
 from wallkit.errors import OutputError
 from wallkit.maps.canonical import canonical
-from wallkit.maps.changes import Change
-from wallkit.maps.compare import TOLERANCE, compare_maps
-from wallkit.maps.compare_links import Side, renamed_links
-from wallkit.maps.merge import Conflict, merge_maps
-from wallkit.maps.merge_names import Names
+from wallkit.maps.diff.changes import Change
+from wallkit.maps.diff.compare import TOLERANCE, compare_maps
+from wallkit.maps.diff.links import Side, renamed_links
+from wallkit.maps.diff.merge import Conflict, merge_maps
+from wallkit.maps.diff.merge_names import Names
 from wallkit.maps.model import SemanticMap
 from wallkit.maps.read import load_map
 from wallkit.maps.rules import validate

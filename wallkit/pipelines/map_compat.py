@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from wallkit.core.types import Float64Array
-from wallkit.maps.compat import ToolView, views_of
-from wallkit.maps.judged import Judged
+from wallkit.maps.findings.compat import ToolView, views_of
+from wallkit.maps.findings.judged import Judged
 from wallkit.maps.model import SemanticMap
 from wallkit.pipelines.map import Selection, judge
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from wallkit.errors import MapError, OutputError
+from wallkit.maps.draw.plan import PlanSettings, draw_plan
 from wallkit.maps.model import SemanticMap
 from wallkit.maps.read import load_map
-from wallkit.maps.render import PlanSettings, draw_plan
 from wallkit.maps.rules.base import MapFinding
 from wallkit.pipelines.map import Selection, judge
 from wallkit.pipelines.outputs import write_whole
@@ -69,8 +69,8 @@ def write_plan(
     Raises:
         MapError: there is nothing to draw. OutputError: it cannot be written.
     """
-    from wallkit.maps.render_png import png_from_drawing
-    from wallkit.maps.render_svg import svg_from_drawing
+    from wallkit.maps.draw.png import png_from_drawing
+    from wallkit.maps.draw.svg import svg_from_drawing
 
     drawing = draw_plan(semantic_map, settings, findings)
     is_svg = out.suffix.lower() == ".svg"

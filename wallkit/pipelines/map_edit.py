@@ -9,7 +9,7 @@ from pathlib import Path
 
 from wallkit.errors import MapError, OutputError
 from wallkit.maps.document import apply_edits
-from wallkit.maps.draft_write import write_draft
+from wallkit.maps.draft.write import write_draft
 from wallkit.maps.edit.changes import Step, appended
 from wallkit.maps.edit.templates import TemplateSizes, new_draft
 from wallkit.maps.rules import RULES, validate

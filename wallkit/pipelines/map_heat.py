@@ -11,8 +11,8 @@ import numpy as np
 from wallkit.core.types import Int64Array
 from wallkit.errors import OutputError
 from wallkit.maps.classes import RESTROOM_V1
-from wallkit.maps.rivals import CONTINUUM
-from wallkit.maps.world import World
+from wallkit.maps.score.rivals import CONTINUUM
+from wallkit.maps.score.world import World
 from wallkit.pipelines.map import write_whole
 from wallkit.report import canvas
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from wallkit.errors import Finding, MapError, OutputError
-from wallkit.maps.draft import Draft
-from wallkit.maps.draft_write import write_draft
+from wallkit.maps.draft.draft import Draft
+from wallkit.maps.draft.write import write_draft
 from wallkit.maps.importers import ImportOptions, import_map
 from wallkit.pipelines.map import SUFFIX
 from wallkit.pipelines.outputs import write_whole

@@ -11,16 +11,16 @@ import numpy as np
 
 from wallkit.core.types import Float64Array
 from wallkit.errors import MapError
-from wallkit.maps.draft_write import write_draft
+from wallkit.maps.draft.write import write_draft
 from wallkit.maps.importers import ImportOptions, import_map
 from wallkit.maps.read import load_map
-from wallkit.maps.rivals import CONTINUUM, MOST_RIVALS
 from wallkit.maps.rules.base import Context
 from wallkit.maps.rules.outlook import robot_in_words, score_settings, world
 from wallkit.maps.rules.tolerances import Tolerances
-from wallkit.maps.score import Ambiguity, Localisability, score
+from wallkit.maps.score.rivals import CONTINUUM, MOST_RIVALS
+from wallkit.maps.score.score import Ambiguity, Localisability, score
+from wallkit.maps.score.world import ScoreSettings, World
 from wallkit.maps.sight import cast_beams, index_segments
-from wallkit.maps.world import ScoreSettings, World
 from wallkit.maps.xml import parse
 from wallkit.pipelines.maps import is_semantic
 

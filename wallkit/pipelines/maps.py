@@ -9,11 +9,11 @@ from pathlib import Path
 from wallkit.core.types import FieldSet, OccupancyGrid
 from wallkit.errors import Finding, MapError
 from wallkit.logs.reader import Log
-from wallkit.maps.fields import MapsSettings, fields_from_grid
+from wallkit.maps.grids.fields import MapsSettings, fields_from_grid
+from wallkit.maps.grids.raster import read_raster
+from wallkit.maps.grids.semantic_fields import fields_from_map
 from wallkit.maps.model import SemanticMap
-from wallkit.maps.raster import read_raster
 from wallkit.maps.read import load_map as load_semantic_map
-from wallkit.maps.semantic_fields import fields_from_map
 
 _BYTE_ORDER_MARKS = (b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff")
 

@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from wallkit.maps.draft import Draft, DraftFixture, DraftOpening, DraftPane, DraftRoom, DraftWall
-from wallkit.maps.draft_doors import DoorMotion, DraftDoor
+from wallkit.maps.draft.doors import DoorMotion, DraftDoor
+from wallkit.maps.draft.draft import Draft, DraftFixture, DraftOpening, DraftPane, DraftRoom, DraftWall
 from wallkit.pipelines.simulate_rooms import FURNISHERS, Plot
 
 DOOR_M = 2.1

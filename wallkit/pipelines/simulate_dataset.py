@@ -21,7 +21,7 @@ from wallkit.dataset.documents import Record, split_of_groups
 from wallkit.dataset.labels import Labelled, Labelling
 from wallkit.dataset.write import Layout, manifest_record, write_documents, write_picture
 from wallkit.errors import DatasetError
-from wallkit.maps.draft_write import write_draft
+from wallkit.maps.draft.write import write_draft
 from wallkit.maps.read import load_map, read_map
 from wallkit.maps.xml import parse
 from wallkit.pipelines.dataset_views import Variety, camera_of, looks_of, people_of, views_of

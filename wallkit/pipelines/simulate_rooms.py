@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wallkit.maps.draft import DraftFixture, DraftOpening, DraftWall
-from wallkit.maps.draft_doors import DraftDoor
+from wallkit.maps.draft.doors import DraftDoor
+from wallkit.maps.draft.draft import DraftFixture, DraftOpening, DraftWall
 
 # before a door nothing stands
 _BEFORE_DOOR_M = 1.15

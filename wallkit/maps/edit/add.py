@@ -13,10 +13,10 @@ from wallkit.core.geometry import compose
 from wallkit.core.types import Float64Array
 from wallkit.maps.classes import ClassInfo
 from wallkit.maps.document import Edit, Element, wk
-from wallkit.maps.draft import SLIVER_M, DraftFixture, DraftRoom, DraftWall
-from wallkit.maps.draft_joints import stop_at
-from wallkit.maps.draft_placed import PlacedWall
-from wallkit.maps.draft_xml import class_line, fixture_lines, number_text, numbers_text, room_line, wall_lines
+from wallkit.maps.draft.draft import SLIVER_M, DraftFixture, DraftRoom, DraftWall
+from wallkit.maps.draft.joints import stop_at
+from wallkit.maps.draft.placed import PlacedWall
+from wallkit.maps.draft.xml import class_line, fixture_lines, number_text, numbers_text, room_line, wall_lines
 from wallkit.maps.edit.changes import Changes, appended, inserted_behind, inserted_first
 from wallkit.maps.edit.lookup import Wall, check_new, class_named, numbered, refuse, room_named, wall_named
 from wallkit.maps.importers.fixtures import USUAL_SIZES, UsualSize

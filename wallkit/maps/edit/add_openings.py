@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from wallkit.maps.document import Edit
-from wallkit.maps.draft import DraftOpening, DraftPane
-from wallkit.maps.draft_doors import CLEARANCE_M, DoorMotion, DraftDoor, Leaf, leaves_of
-from wallkit.maps.draft_xml import door_lines, number_text, pane_lines
+from wallkit.maps.draft.doors import CLEARANCE_M, DoorMotion, DraftDoor, Leaf, leaves_of
+from wallkit.maps.draft.draft import DraftOpening, DraftPane
+from wallkit.maps.draft.xml import door_lines, number_text, pane_lines
 from wallkit.maps.edit.add import rooms_beside, side_named
 from wallkit.maps.edit.changes import Changes, appended, with_attribute
 from wallkit.maps.edit.cut import check_fits, cut

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from wallkit.errors import closest
 from wallkit.maps.classes import DEFAULT_TAXONOMY, TAXONOMIES
 from wallkit.maps.document import Edit
-from wallkit.maps.draft_xml import attributes, class_line, number_text
+from wallkit.maps.draft.xml import attributes, class_line, number_text
 from wallkit.maps.edit.changes import Changes, declared, inserted_first, with_attribute
 from wallkit.maps.edit.lookup import link_named, refuse
 from wallkit.maps.grammar import FORMAT, UNITS

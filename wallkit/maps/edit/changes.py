@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from wallkit.core.types import Float64Array
 from wallkit.errors import MapError
 from wallkit.maps.document import WK_NAMESPACE, Attribute, Document, Edit, Element, apply_edits, escaped
-from wallkit.maps.draft_xml import ANGLE_DECIMALS
-from wallkit.maps.draft_xml import DECIMALS as LENGTH_DECIMALS
+from wallkit.maps.draft.xml import ANGLE_DECIMALS
+from wallkit.maps.draft.xml import DECIMALS as LENGTH_DECIMALS
 from wallkit.maps.numbers import number_from_text
 from wallkit.maps.rules.base import Context
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from wallkit.core.types import Float64Array
 from wallkit.maps.document import Edit, Element
-from wallkit.maps.draft_xml import number_text, numbers_text
+from wallkit.maps.draft.xml import number_text, numbers_text
 from wallkit.maps.edit.changes import Changes, indent_of, newline_of, sliced
 from wallkit.maps.edit.lookup import Wall, free_name, joint_above, refuse, wall_named
 from wallkit.maps.edit.place import copied_joint

@@ -12,8 +12,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from wallkit.maps.document import Edit
-from wallkit.maps.draft import SLIVER_M, DraftOpening
-from wallkit.maps.draft_xml import box_line, letters, number_text, opening_line
+from wallkit.maps.draft.draft import SLIVER_M, DraftOpening
+from wallkit.maps.draft.xml import box_line, letters, number_text, opening_line
 from wallkit.maps.edit.changes import (
     Changes,
     indent_of,

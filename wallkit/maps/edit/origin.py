@@ -9,7 +9,7 @@ import numpy as np
 
 from wallkit.core.geometry import invert, matrix_from_pose, transform_points
 from wallkit.maps.document import Edit
-from wallkit.maps.draft_xml import attributes, number_text, numbers_text
+from wallkit.maps.draft.xml import attributes, number_text, numbers_text
 from wallkit.maps.edit.changes import Changes, inserted_first, renumbered, with_attribute
 from wallkit.maps.edit.lookup import refuse
 from wallkit.maps.edit.place import origin_edits

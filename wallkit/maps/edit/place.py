@@ -10,7 +10,7 @@ import numpy as np
 from wallkit.core.geometry import invert_matrix
 from wallkit.core.types import Float64Array
 from wallkit.maps.document import Edit
-from wallkit.maps.draft_xml import number_text, numbers_text
+from wallkit.maps.draft.xml import number_text, numbers_text
 from wallkit.maps.edit.changes import Changes, renumbered, set_origin, sliced
 from wallkit.maps.edit.lookup import joint_above, link_named, opening_named, refuse, wall_named
 from wallkit.maps.nouns import Joint, Opening

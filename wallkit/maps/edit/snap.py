@@ -13,7 +13,7 @@ from wallkit.core.types import Float64Array
 from wallkit.maps.document import Edit
 from wallkit.maps.edit.changes import Changes, Step
 from wallkit.maps.edit.place import rotate
-from wallkit.maps.repair import repair
+from wallkit.maps.findings.repair import repair
 from wallkit.maps.rules.base import Context
 
 # directions that are nearer to a right angle than this are exact; numbers are written with so many digits

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from wallkit.errors import MapError
-from wallkit.maps.draft import Draft, DraftFixture, DraftOpening, DraftRoom, DraftWall
-from wallkit.maps.draft_doors import CLEARANCE_M, DraftDoor
+from wallkit.maps.draft.doors import CLEARANCE_M, DraftDoor
+from wallkit.maps.draft.draft import Draft, DraftFixture, DraftOpening, DraftRoom, DraftWall
 from wallkit.maps.edit.add import SIZES
 
 DOOR_HEIGHT_M = 2.1

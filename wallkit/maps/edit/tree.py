@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 
 from wallkit.maps.document import Edit
-from wallkit.maps.draft_xml import numbers_text
+from wallkit.maps.draft.xml import numbers_text
 from wallkit.maps.edit.changes import Changes, removed, with_attribute, without_attribute
 from wallkit.maps.edit.lookup import joint_above, link_named, refuse
 from wallkit.maps.edit.place import placed_anew

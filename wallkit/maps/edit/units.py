@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 
 from wallkit.maps.document import Edit, Element, wk
-from wallkit.maps.draft_xml import number_text
+from wallkit.maps.draft.xml import number_text
 from wallkit.maps.edit.changes import Changes, renumbered
 from wallkit.maps.edit.lookup import link_named, refuse
 from wallkit.maps.grammar import TAGS

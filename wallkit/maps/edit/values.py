@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 from wallkit.errors import closest
 from wallkit.maps.document import Edit, Element, wk
-from wallkit.maps.draft_xml import attributes
+from wallkit.maps.draft.xml import attributes
 from wallkit.maps.edit.changes import Changes, inserted_behind, inserted_first, with_attribute, without_attribute
 from wallkit.maps.edit.lookup import class_named, refuse, room_named
 from wallkit.maps.grammar import TAGS, Value

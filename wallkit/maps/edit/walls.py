@@ -7,8 +7,8 @@ import math
 from wallkit.core.geometry import invert_matrix
 from wallkit.core.types import Float64Array
 from wallkit.maps.document import Edit
-from wallkit.maps.draft import SLIVER_M
-from wallkit.maps.draft_xml import attributes, number_text
+from wallkit.maps.draft.draft import SLIVER_M
+from wallkit.maps.draft.xml import attributes, number_text
 from wallkit.maps.edit.changes import (
     Changes,
     indent_of,

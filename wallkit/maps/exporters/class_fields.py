@@ -17,8 +17,8 @@ import wallkit
 from wallkit.core.types import FieldSet, Float32Array
 from wallkit.errors import MapError
 from wallkit.maps.exporters.exported import Exported, ExportOptions, Notes, height_of
+from wallkit.maps.grids.semantic_fields import SIGMA_M, fields_from_map
 from wallkit.maps.model import SemanticMap
-from wallkit.maps.semantic_fields import SIGMA_M, fields_from_map
 from wallkit.maps.surfaces import p_return_of
 
 CELL_M = 0.025

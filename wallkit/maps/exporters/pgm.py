@@ -16,9 +16,9 @@ import numpy as np
 from wallkit.core.types import BoolArray, Float64Array
 from wallkit.errors import MapError
 from wallkit.maps.exporters.exported import Exported, ExportOptions, Notes, height_of, lose_meaning
-from wallkit.maps.fields import visible_surface
 from wallkit.maps.geometry import Part, Slice, parts, slice_parts
-from wallkit.maps.lattice import Lattice, lattice_around
+from wallkit.maps.grids.fields import visible_surface
+from wallkit.maps.grids.lattice import Lattice, lattice_around
 from wallkit.maps.model import SemanticMap
 from wallkit.maps.surfaces import door_alternatives, floor_at
 

@@ -1,7 +1,7 @@
 """Wall boxes and openings -> the lines of a traffic editor: walls along their axes that meet in points, gaps for the doors.
 
 Boxes end at each other's faces, lines meet at each other's axes: an end that touches another wall moves along its own axis
-to where the two axes cross. That undoes what `wallkit.maps.draft_joints` does to drawn lines.
+to where the two axes cross. That undoes what `wallkit.maps.draft.joints` does to drawn lines.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wallkit.core.types import Float64Array
-from wallkit.maps.draft_joints import CONTINUES_RAD
+from wallkit.maps.draft.joints import CONTINUES_RAD
 from wallkit.maps.model import SemanticMap
 from wallkit.maps.nouns import Opening
 from wallkit.maps.walls import WallRun

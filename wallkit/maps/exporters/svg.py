@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from wallkit.maps.draw.plan import PlanSettings, plan_svg
 from wallkit.maps.exporters.exported import Exported, ExportOptions, Notes, things
 from wallkit.maps.model import SemanticMap
-from wallkit.maps.render import PlanSettings, plan_svg
 
 
 def export_svg(semantic_map: SemanticMap, out: Path, options: ExportOptions) -> Exported:

@@ -15,7 +15,7 @@ import numpy as np
 
 from wallkit.errors import MapError, closest
 from wallkit.maps.classes import RESTROOM_V1, ClassInfo
-from wallkit.maps.draft import Draft, DraftFixture, DraftWall
+from wallkit.maps.draft.draft import Draft, DraftFixture, DraftWall
 from wallkit.maps.importers.imported import Imported, ImportOptions, Names, Notes, read_text, tally
 from wallkit.maps.importers.units import METRES, Evidence, check_unit, finding_of, judge_units
 

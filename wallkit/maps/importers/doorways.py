@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from wallkit.maps.draft import DraftOpening, DraftWall
-from wallkit.maps.draft_doors import DraftDoor
+from wallkit.maps.draft.doors import DraftDoor
+from wallkit.maps.draft.draft import DraftOpening, DraftWall
 
 
 def hang_doors(doors: Sequence[DraftWall], walls: Sequence[DraftWall]) -> Iterator[DraftWall]:

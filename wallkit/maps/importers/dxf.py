@@ -15,8 +15,8 @@ import numpy as np
 from wallkit.core.types import Float64Array
 from wallkit.errors import MapError
 from wallkit.maps.classes import class_from_name
-from wallkit.maps.draft import Draft, DraftFixture, DraftOpening, DraftWall
-from wallkit.maps.draft_doors import CLEARANCE_M, DraftDoor
+from wallkit.maps.draft.doors import CLEARANCE_M, DraftDoor
+from wallkit.maps.draft.draft import Draft, DraftFixture, DraftOpening, DraftWall
 from wallkit.maps.importers.dxf_drawing import WALL_WORDS, Drawing, Swing, read_drawing
 from wallkit.maps.importers.fixtures import EXTRA_CLASSES, USUAL_SIZES, place_fixture
 from wallkit.maps.importers.imported import Imported, ImportOptions, Names, Notes, tally

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wallkit.maps.classes import ClassInfo
-from wallkit.maps.draft import DraftFixture, DraftWall
+from wallkit.maps.draft.draft import DraftFixture, DraftWall
 
 # how far a symbol's reference point may be from the wall that carries it: half a toilet and some
 REACH_M = 0.7

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wallkit.core.types import Float64Array
-from wallkit.maps.draft_joints import MEETING_M, meetings
+from wallkit.maps.draft.joints import MEETING_M, meetings
 
 # rule WK-E020: what is wider is meant
 WIDEST_GAP_M = 0.3

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from wallkit.errors import Finding, MapError, Severity
-from wallkit.maps.draft import WALL_HEIGHT_M, Draft
+from wallkit.maps.draft.draft import WALL_HEIGHT_M, Draft
 
 # far beyond any floor plan; a larger file is something else
 LARGEST_BYTES = 200_000_000

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from wallkit.errors import MapError
-from wallkit.maps.draft import Draft, DraftWall
+from wallkit.maps.draft.draft import Draft, DraftWall
 from wallkit.maps.importers.gaps import find_gaps, gap_list
 from wallkit.maps.importers.imported import Imported, ImportOptions, Names, Notes
 from wallkit.maps.importers.units import METRES, Evidence, check_unit, finding_of, judge_units

@@ -18,12 +18,12 @@ import numpy as np
 from wallkit.core.geometry import transform_points
 from wallkit.core.types import BoolArray, Float64Array, OccupancyGrid
 from wallkit.errors import MapError
-from wallkit.maps.draft import Draft, DraftFixture, DraftWall
-from wallkit.maps.draft_placed import placed_walls
-from wallkit.maps.fields import FREE_TO, OCCUPIED_FROM, MapsSettings, distance_to, visible_surface
+from wallkit.maps.draft.draft import Draft, DraftFixture, DraftWall
+from wallkit.maps.draft.placed import placed_walls
+from wallkit.maps.grids.fields import FREE_TO, OCCUPIED_FROM, MapsSettings, distance_to, visible_surface
+from wallkit.maps.grids.raster import read_raster
 from wallkit.maps.importers.imported import Imported, ImportOptions, Notes
 from wallkit.maps.importers.skeleton import middle_lines
-from wallkit.maps.raster import read_raster
 
 # how far a wall's axis may be from the middle of its cells
 TOLERANCE_CELLS = 0.75
@@ -61,7 +61,7 @@ def read_map_raster(path: Path, options: ImportOptions) -> Imported:
     """The raster of a map_server YAML as one level.
 
     Raises:
-        MapError: the pair cannot be read (see wallkit.maps.raster), or has no occupied cell.
+        MapError: the pair cannot be read (see wallkit.maps.grids.raster), or has no occupied cell.
     """
     grid, findings = read_raster(path)
     notes = Notes(path, list(findings))
@@ -126,7 +126,7 @@ def residual_of(grid: OccupancyGrid, band: BoolArray, draft: Draft) -> Residual:
 
 
 def _seen_band(grid: OccupancyGrid, occupied: BoolArray) -> BoolArray:
-    """The occupied cells a LiDAR may have met: those the localizer takes for surface (wallkit.maps.fields)."""
+    """The occupied cells a LiDAR may have met: those the localizer takes for surface (wallkit.maps.grids.fields)."""
     free = (grid.cells >= 0) & (grid.cells <= FREE_TO)
     surface = visible_surface(occupied, free, grid.resolution_m)
     return np.asarray(surface | (occupied & (distance_to(surface, grid.resolution_m) <= MapsSettings.wall_depth_m)))

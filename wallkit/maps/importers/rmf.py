@@ -17,8 +17,8 @@ import numpy as np
 from wallkit.core.types import Float64Array
 from wallkit.errors import MapError, closest
 from wallkit.maps.classes import class_from_name
-from wallkit.maps.draft import Draft, DraftFixture, DraftOpening, DraftWall
-from wallkit.maps.draft_doors import DoorMotion, DraftDoor
+from wallkit.maps.draft.doors import DoorMotion, DraftDoor
+from wallkit.maps.draft.draft import Draft, DraftFixture, DraftOpening, DraftWall
 from wallkit.maps.importers.doorways import hang_doors
 from wallkit.maps.importers.fixtures import EXTRA_CLASSES, USUAL_SIZES, place_fixture
 from wallkit.maps.importers.gaps import find_gaps, find_misses, find_near_duplicates, gap_list

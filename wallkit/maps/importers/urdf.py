@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
-from wallkit.maps.draft import Draft
+from wallkit.maps.draft.draft import Draft
 from wallkit.maps.importers.imported import Imported, ImportOptions, Notes, tally
 from wallkit.maps.model import SemanticMap
 from wallkit.maps.nouns import MeshFile

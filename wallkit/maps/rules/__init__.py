@@ -48,7 +48,7 @@ from wallkit.maps.rules.tolerances import Tolerances
 from wallkit.maps.xml import parse
 
 if TYPE_CHECKING:
-    from wallkit.maps.audit_nouns import Evidence
+    from wallkit.maps.audit.nouns import Evidence
 
 _GROUPS = (
     *(xml_bytes.RULES, schema.RULES, values.RULES, graph.RULES, joints.RULES),

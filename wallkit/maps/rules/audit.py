@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from wallkit.core.geometry import invert
-from wallkit.maps.audit_nouns import Cluster, DoorEvidence, ElementEvidence, Evidence, Shift
-from wallkit.maps.audit_paste import command_for, paste_for, unused_name
+from wallkit.maps.audit.nouns import Cluster, DoorEvidence, ElementEvidence, Evidence, Shift
+from wallkit.maps.audit.paste import command_for, paste_for, unused_name
 from wallkit.maps.document import Edit
 from wallkit.maps.nouns import Joint
 from wallkit.maps.numbers import text_from_number

@@ -18,7 +18,7 @@ from wallkit.maps.document import Attribute, Document, Edit, Element, Span
 from wallkit.maps.rules.tolerances import Tolerances
 
 if TYPE_CHECKING:
-    from wallkit.maps.audit_nouns import Evidence
+    from wallkit.maps.audit.nouns import Evidence
     from wallkit.maps.geometry import Part, Slice
     from wallkit.maps.labels import Labels
     from wallkit.maps.model import SemanticMap

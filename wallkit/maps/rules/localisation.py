@@ -7,10 +7,10 @@ from collections.abc import Iterator
 
 from wallkit.core.types import Float64Array
 from wallkit.maps.document import wk
-from wallkit.maps.rivals import CONTINUUM, MOST_RIVALS
 from wallkit.maps.rules.base import Context, Problem, Rule, Where
 from wallkit.maps.rules.outlook import ambiguity, places, robot_in_words, seen
-from wallkit.maps.score import Ambiguity
+from wallkit.maps.score.rivals import CONTINUUM, MOST_RIVALS
+from wallkit.maps.score.score import Ambiguity
 
 
 def check_ambiguity(context: Context) -> Iterator[Problem]:

@@ -15,11 +15,11 @@ from wallkit.maps.rules.base import Context
 from wallkit.maps.rules.floods import closed_leaves, holes, sealed_regions
 from wallkit.maps.rules.scale import wrong_unit
 from wallkit.maps.rules.solids import leaf_links, structure
-from wallkit.maps.score import Ambiguity, ambiguity_of
-from wallkit.maps.seen import Seen, look_from
+from wallkit.maps.score.score import Ambiguity, ambiguity_of
+from wallkit.maps.score.seen import Seen, look_from
+from wallkit.maps.score.world import Pose, Scene, ScoreSettings, World, part_of, poses_scattered
 from wallkit.maps.space import PASSAGE_M
 from wallkit.maps.surfaces import floor_at, p_return_of
-from wallkit.maps.world import Pose, Scene, ScoreSettings, World, part_of, poses_scattered
 
 if TYPE_CHECKING:
     from shapely import Geometry

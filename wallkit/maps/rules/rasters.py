@@ -10,8 +10,8 @@ import numpy as np
 
 from wallkit.errors import closest
 from wallkit.maps.document import Edit, Span
-from wallkit.maps.raster import FREE_THRESH, MODES, OCCUPIED_THRESH, UNKNOWN_GREY
-from wallkit.maps.raster_sheet import Sheet, read_sheet
+from wallkit.maps.grids.raster import FREE_THRESH, MODES, OCCUPIED_THRESH, UNKNOWN_GREY
+from wallkit.maps.grids.raster_sheet import Sheet, read_sheet
 from wallkit.maps.rules.base import Context, Problem, Rule
 
 # occupancy of grey 205, what map_saver writes for unknown

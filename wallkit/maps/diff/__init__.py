@@ -1,0 +1,1 @@
+"""What changed between two maps, and one map out of two that were changed."""

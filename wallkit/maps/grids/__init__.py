@@ -1,0 +1,1 @@
+"""Rasters: map_server files, and the fields of distances that a filter reads."""
