@@ -1,0 +1,180 @@
+"""A score of every class for every cell of a grid, or the class itself -> a class at any pixel of the camera's image."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike
+
+from wallkit.core.segmentation import Polygon
+from wallkit.core.types import BoolArray, Float32Array, Float64Array, Int64Array
+from wallkit.segment.class_map import chosen, mask_of, nearest_cells
+from wallkit.segment.letterbox import Letterbox
+from wallkit.segment.outlines import polygons_of
+
+
+@dataclass(frozen=True, eq=False)
+class ScoreMap:
+    """A Segmentation of stuff: between cells the scores are bilinear, the highest one counts.
+
+    Attributes:
+        scores: (h, w, C) float32 over the network's input, at any fraction of its size.
+        is_probability: they sum to 1 over the classes; else they are logits, and the confidence is their softmax.
+    """
+
+    names: tuple[str, ...]
+    roles: tuple[str, ...]
+    frame: Letterbox
+    scores: Float32Array
+    is_probability: bool
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """See Segmentation."""
+        return self.frame.image
+
+    def classes_at(self, pixels: ArrayLike) -> tuple[Int64Array, Float32Array]:
+        """See Segmentation."""
+        at = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+        _, _, inside = nearest_cells(at, self.shape)
+        labels, confidences = np.full(len(at), -1, dtype=np.int64), np.zeros(len(at), dtype=np.float32)
+        columns, rows = self._cells(np.where(inside[:, None], at, 0)).T
+        sampled = _sample(self.scores, np.ascontiguousarray(columns), np.ascontiguousarray(rows))
+        labels[inside] = sampled.argmax(axis=1)[inside]
+        confidences[inside] = _shares(sampled, is_probability=self.is_probability).max(axis=1)[inside]
+        return labels, confidences
+
+    def labels(self) -> Int64Array:
+        """See Segmentation."""
+        return self._labels
+
+    def mask(self, roles: Collection[str]) -> BoolArray:
+        """See Segmentation."""
+        return mask_of(self._labels, self.roles, roles)
+
+    def polygons(self, roles: Collection[str] | None = None) -> list[Polygon]:
+        """See Segmentation; the confidences are those of the nearest cells."""
+        columns, rows = (np.rint(line).astype(np.int64) for line in self._lines())
+        sure = _shares(self.scores, is_probability=self.is_probability).max(axis=2)
+        return polygons_of(self._labels, sure[np.ix_(rows, columns)], chosen(self.roles, roles))
+
+    @cached_property
+    def _labels(self) -> Int64Array:
+        columns, rows = self._lines()
+        return np.asarray(_highest(self.scores, columns, rows))
+
+    def _lines(self) -> tuple[Float64Array, Float64Array]:
+        """Columns (W,) and rows (H,) of the grid where the image's pixels lie."""
+        height, width = self.shape
+        columns = self._cells(np.stack([np.arange(width), np.zeros(width)], axis=1))[:, 0]
+        rows = self._cells(np.stack([np.zeros(height), np.arange(height)], axis=1))[:, 1]
+        return np.ascontiguousarray(columns), np.ascontiguousarray(rows)
+
+    def _cells(self, pixels: Float64Array) -> Float64Array:
+        """(K, 2) column and row in the grid, between its border cells, where pixels (K, 2) of the image lie."""
+        rows, columns, _ = self.scores.shape
+        cell = self.frame.net[1] / columns, self.frame.net[0] / rows
+        at = (self.frame.net_from_image(pixels) + 0.5) / cell - 0.5
+        return np.asarray(np.clip(at, 0, (columns - 1, rows - 1)))
+
+
+@dataclass(frozen=True, eq=False)
+class IdMap:
+    """A Segmentation of stuff whose cells hold the class itself: the nearest one counts, and nobody knows how sure.
+
+    Attributes:
+        ids: (h, w) int64 over the network's input; what has no name is -1.
+    """
+
+    names: tuple[str, ...]
+    roles: tuple[str, ...]
+    frame: Letterbox
+    ids: Int64Array
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """See Segmentation."""
+        return self.frame.image
+
+    def classes_at(self, pixels: ArrayLike) -> tuple[Int64Array, Float32Array]:
+        """See Segmentation."""
+        at = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+        _, _, inside = nearest_cells(at, self.shape)
+        found = np.where(inside, self._ids_at(np.where(inside[:, None], at, 0)), -1)
+        return found, (found >= 0).astype(np.float32)
+
+    def labels(self) -> Int64Array:
+        """See Segmentation."""
+        return self._labels
+
+    def mask(self, roles: Collection[str]) -> BoolArray:
+        """See Segmentation."""
+        return mask_of(self._labels, self.roles, roles)
+
+    def polygons(self, roles: Collection[str] | None = None) -> list[Polygon]:
+        """See Segmentation."""
+        return polygons_of(self._labels, 1.0, chosen(self.roles, roles))
+
+    @cached_property
+    def _labels(self) -> Int64Array:
+        height, width = self.shape
+        v, u = np.mgrid[:height, :width]
+        return self._ids_at(np.stack([u.ravel(), v.ravel()], axis=1)).reshape(self.shape)
+
+    def _ids_at(self, pixels: ArrayLike) -> Int64Array:
+        cell = self.frame.net[1] / self.ids.shape[1], self.frame.net[0] / self.ids.shape[0]
+        at = np.floor((self.frame.net_from_image(pixels) + 0.5) / cell).astype(np.int64)
+        columns, rows = np.clip(at, 0, (self.ids.shape[1] - 1, self.ids.shape[0] - 1)).T
+        return np.asarray(self.ids[rows, columns])
+
+
+def _shares(scores: Float32Array, *, is_probability: bool) -> Float32Array:
+    """Scores (..., C) as they sum to 1."""
+    if is_probability:
+        return scores
+    grown = np.exp(scores - scores.max(axis=-1, keepdims=True))
+    return np.asarray(grown / grown.sum(axis=-1, keepdims=True), dtype=np.float32)
+
+
+@njit(cache=True, nogil=True)
+def _sample(scores, columns, rows):  # type: ignore[no-untyped-def]
+    """(K, C) bilinear scores (h, w, C) at columns and rows (K,)."""
+    height, width, classes = scores.shape
+    out = np.empty((len(columns), classes), dtype=np.float32)
+    for k in range(len(columns)):
+        left, top = int(columns[k]), int(rows[k])
+        right, bottom = min(left + 1, width - 1), min(top + 1, height - 1)
+        a, b = np.float32(columns[k] - left), np.float32(rows[k] - top)
+        for c in range(classes):
+            upper = scores[top, left, c] * (1 - a) + scores[top, right, c] * a
+            lower = scores[bottom, left, c] * (1 - a) + scores[bottom, right, c] * a
+            out[k, c] = upper * (1 - b) + lower * b
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _highest(scores, columns, rows):  # type: ignore[no-untyped-def]
+    """(H, W) the class with the highest bilinear score at rows (H,) and columns (W,)."""
+    height, width, classes = scores.shape
+    out = np.empty((len(rows), len(columns)), dtype=np.int64)
+    line = np.empty((width, classes), dtype=np.float32)
+    for i in range(len(rows)):
+        top = int(rows[i])
+        bottom, b = min(top + 1, height - 1), np.float32(rows[i] - top)
+        for x in range(width):
+            for c in range(classes):
+                line[x, c] = scores[top, x, c] * (1 - b) + scores[bottom, x, c] * b
+        for j in range(len(columns)):
+            left = int(columns[j])
+            right, a = min(left + 1, width - 1), np.float32(columns[j] - left)
+            best = line[left, 0] * (1 - a) + line[right, 0] * a
+            out[i, j] = 0
+            for c in range(1, classes):
+                value = line[left, c] * (1 - a) + line[right, c] * a
+                if value > best:
+                    best, out[i, j] = value, c
+    return out
