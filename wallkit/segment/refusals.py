@@ -7,7 +7,7 @@ from wallkit.segment.model_file import ModelFile, shape_words
 
 _WANTED = (
     "wanted: input [1, 3, H, W] of floats; outputs [1, 4 + classes + coefficients, anchors] or [1, rows, 6 + coefficients]"
-    " with prototypes [1, coefficients, h, w] (YOLO-seg), or [1, classes, h, w] scores, or [1, h, w] whole numbers (semantic)"
+    " with prototypes [1, coefficients, h, w] (YOLO-seg), or [1, classes, h, w] scores, or [1, h, w] ids (semantic)"
 )
 _EXPORT = "export a model that segments, such as yolo11n-seg: `wallkit model export best.pt`"
 _TASKS = {
