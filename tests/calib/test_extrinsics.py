@@ -194,7 +194,7 @@ def test_pixel_error_covers_drawn_errors():
     camera = Camera("plumb_bob", 640, 480, np.array([[500, 0, 320], [0, 500, 240], [0, 0, 1.0]]), np.zeros(5))
     T = level()
     root = np.diag([0.003, 0.002, 0.004, 0.005, 0.003, 0.006])
-    table = pixel_error_95(camera, T, root @ root.T, ranges_m=(1.0, 3.0))
+    table = pixel_error_95(camera, T, root @ root.T, ranges_m=(1.0, 3.0), elevations=np.zeros(2))
     for range_m, limit in table:
         p = np.array([range_m * np.cos(0.45), range_m * np.sin(0.45), 0.0])
         here = camera.project(p @ T[:3, :3].T + T[:3, 3])
@@ -204,6 +204,20 @@ def test_pixel_error_covers_drawn_errors():
         share = (error < limit).mean()
         assert 0.94 < share < 0.995
     assert table[0, 1] > table[1, 1]
+
+
+def test_pixel_error_is_that_of_the_rows_that_beams_can_meet():
+    """A LiDAR of +-15 deg never meets the rows where a roll and a height that are badly known would do most harm."""
+    camera = Camera("plumb_bob", 640, 480, np.array([[300, 0, 320], [0, 300, 240], [0, 0, 1.0]]), np.zeros(5))
+    T, C = level(), np.diag([1e-3, 1e-3, 1e-2, 1e-3, 1e-3, 1e-3]) ** 2
+    low, high = np.radians([-15.0, 15.0])
+    planar, band, anything = (
+        pixel_error_95(camera, T, C, elevations=beams, ranges_m=(3.0,))[0, 1]
+        for beams in (np.zeros(2), np.array([low, high]), None)
+    )
+    assert planar < band < 0.98 * anything
+    # nothing of the image is hit by beams that all point up
+    assert not len(pixel_error_95(camera, T, C, elevations=np.radians([70.0, 80.0])))
 
 
 def test_too_few_views():

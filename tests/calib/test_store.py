@@ -34,6 +34,8 @@ def whole(model: str) -> Calibration:
         T_camera_lidar=T,
         lidar_frame="laser",
         covariance=half @ half.T * 1e-6,
+        degrees=7.25,
+        elevations=[-0.25, 0.125],
         camera_covariance=wide @ wide.T,
         time_offset_ns=-1234567,
         time_offset_sigma_ns=4.5e5,
@@ -54,13 +56,32 @@ def test_toml_holds_everything_to_the_last_bit(model, tmp_path):
     path.write_text(text_from_calibration(given, "toml"))
     again = read_calibration(path)
     assert_same_camera(again.camera, given.camera)
-    for name in ("T_camera_lidar", "covariance", "camera_covariance", "pixel_error_95"):
+    for name in ("T_camera_lidar", "covariance", "camera_covariance", "pixel_error_95", "elevations"):
         np.testing.assert_array_equal(getattr(again, name), getattr(given, name))
-    for name in ("lidar_frame", "camera_frame", "time_offset_ns", "time_offset_sigma_ns", "verdict", "provenance"):
+    for name in (
+        "lidar_frame",
+        "degrees",
+        "camera_frame",
+        "time_offset_ns",
+        "time_offset_sigma_ns",
+        "verdict",
+        "provenance",
+    ):
         assert getattr(again, name) == getattr(given, name)
     assert again.camera.name == given.camera.name
     assert text_from_calibration(again, "toml") == path.read_text()
     assert FORMATS["toml"].misses(given) == []
+
+
+def test_files_of_schema_1_are_still_read(tmp_path):
+    """They do not say how many degrees of freedom a covariance has: as many as it takes for the normal quantile."""
+    given, path = whole("plumb_bob"), tmp_path / "old.toml"
+    lines = text_from_calibration(given, "toml").replace("schema = 2", "schema = 1").splitlines()
+    path.write_text("\n".join(line for line in lines if not line.startswith(("degrees_of", "elevations"))))
+    old = read_calibration(path)
+    assert old.degrees == np.inf
+    assert old.elevations is None
+    np.testing.assert_array_equal(old.covariance, given.covariance)
 
 
 @pytest.mark.parametrize(
@@ -132,7 +153,7 @@ TOML = text_from_calibration(Calibration(camera("plumb_bob")), "toml")
         ("c.toml", "x = ", "is no TOML"),
         ("c.toml", TOML.replace("fx = ", "gx = "), "lacks fx"),
         ("c.toml", TOML.replace("fx = 612.123456789012", 'fx = "wide"'), "wrong type"),
-        ("c.toml", TOML.replace("schema = 1", "schema = 9"), "schema = 9"),
+        ("c.toml", TOML.replace("schema = 2", "schema = 9"), "schema = 9"),
         ("c.toml", TOML.replace('verdict = ""', 'verdict = "GOOD"'), "verdict 'GOOD'"),
     ],
 )

@@ -38,10 +38,10 @@ def judged_world(seed=0, count=40, world=SHARP, *, place=None, is_own=True):
     result = solve(sightings)
     covariance = result.covariance
     stored = result.T if place is None else place(result.T)
-    calibration = Calibration(CAMERA, T_camera_lidar=stored, covariance=covariance)
+    calibration = Calibration(CAMERA, T_camera_lidar=stored, covariance=covariance, degrees=result.degrees)
     start = evidence_of(calibration, sigma_range_m=world.sigma_range_m, sigma_source="declared", urdf=None)
     boards = tuple((s.name, s.board) for s in sightings)
-    start = replace(start, is_planar=world.is_planar, boards=boards, faults=())
+    start = replace(start, elevations=np.zeros(2) if world.is_planar else None, boards=boards, faults=())
     return with_sightings(start, sightings, result, is_own=is_own, is_whole=is_own, scale=Audit(1.0, 0.003, False, ""))
 
 
@@ -313,6 +313,19 @@ def test_a_calibration_that_was_moved_is_noticed(axis):
     assert found.verdict == "FAIL"
     assert DEGREES_OF_FREEDOM[axis] in found.reason
     assert verify(bumped).verdict == "FAIL"
+
+
+@pytest.mark.parametrize(("planar", "count"), [(True, 12), (True, 30), (False, 12)])
+def test_the_stored_pixel_error_is_the_one_that_verify_finds(planar, count):
+    """The same covariance, degrees of freedom and beams: the file needs no more than what it holds."""
+    evidence = judged_world(7, count, World(is_planar=planar, sigma_range_m=0.006))
+    assert evidence.covariance_source == "of the calibration file"
+    stored = replace(evidence.calibration, elevations=evidence.elevations)
+    alone = evidence_of(stored, sigma_range_m=0.006, sigma_source="declared", urdf=None)
+    np.testing.assert_array_equal(alone.pixel_error, evidence.pixel_error)
+    known = replace(stored, degrees=np.inf)
+    normal = evidence_of(known, sigma_range_m=0.006, sigma_source="declared", urdf=None)
+    assert (normal.pixel_error[:, 1] < 0.95 * alone.pixel_error[:, 1]).all()
 
 
 def test_held_out_is_worse_than_the_fit_and_other_files_are_held_out_anyway(good):

@@ -46,6 +46,9 @@ def test_frames():
         ({"verdict": "MAYBE"}, "one of: PASS, FAIL, CANNOT TELL"),
         ({"pixel_error_95": [[2, 1.0], [1, 2.0]]}, "ascending"),
         ({"pixel_error_95": [[1, np.nan]]}, "table"),
+        ({"elevations": [0.2, -0.2]}, "elevations"),
+        ({"elevations": [0.0, np.nan]}, "elevations"),
+        ({"degrees": 0.0}, "degrees of freedom"),
     ],
 )
 def test_what_cannot_be_is_refused(changes, words):

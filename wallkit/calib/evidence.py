@@ -33,7 +33,7 @@ class Evidence:
         calibration: under judgement.
         boards: by name of the picture, every board that was seen.
         sightings: those that the LiDAR saw too. views: how each fits a calibration without it. held_out: in words.
-        is_planar: of the LiDAR. sigma_range_m: of a range, declared or from a data sheet; sigma_source says which.
+        elevations: (2,) [rad] lowest and highest beam of the LiDAR, as the file or this input has it. sigma_range_m: of a range, declared or from a data sheet; sigma_source says which.
         fresh: a solve from these sightings alone; None when they are too few.
         why_no_fresh: what is in the way.
         covariance: (6, 6) of T_camera_lidar as in `Calibration`, that of the file or of the fresh solve, whichever counts;
@@ -54,7 +54,7 @@ class Evidence:
     sightings: tuple[Sighting, ...] = ()
     views: tuple[ViewFit, ...] = ()
     held_out: str = ""
-    is_planar: bool = True
+    elevations: Float64Array | None = None
     sigma_range_m: float = 0.02
     sigma_source: str = "assumed"
     fresh: Extrinsics | None = None
@@ -91,7 +91,9 @@ def evidence_of(calibration: Calibration, *, sigma_range_m: float, sigma_source:
         sigma_range_m=sigma_range_m,
         sigma_source=sigma_source,
         urdf=urdf,
+        elevations=calibration.elevations,
         covariance=calibration.covariance,
+        degrees=calibration.degrees,
         covariance_source="of the calibration file" if calibration.covariance is not None else "",
     )
     return with_pixel_error(found)
@@ -108,7 +110,7 @@ def with_pixel_error(evidence: Evidence) -> Evidence:
             evidence.covariance,
             degrees=evidence.degrees,
             camera_covariance=calibration.camera_covariance,
-            is_planar=evidence.is_planar,
+            elevations=evidence.elevations,
         )
     return replace(evidence, pixel_error=table if table is not None and len(table) else None)
 
@@ -191,4 +193,4 @@ def _covariance(
         return measured, fresh.degrees, "of these views"
     if is_whole and measured is not None and np.trace(measured[:3, :3]) > 1.5 * np.trace(stored[:3, :3]):
         return measured, fresh.degrees, "of these views, which is larger than the file's"
-    return stored, fresh.degrees if is_whole else np.inf, "of the calibration file"
+    return stored, calibration.degrees, "of the calibration file"

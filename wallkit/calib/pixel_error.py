@@ -12,7 +12,7 @@ from wallkit.core.camera import Camera
 from wallkit.core.types import Float64Array
 
 RANGES_M = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 15.0)
-_COLUMNS = 9
+_STEP_DEG, _ROWS = 1.0, 9
 
 
 def pixel_error_95(
@@ -23,21 +23,23 @@ def pixel_error_95(
     degrees: float = np.inf,
     camera_covariance: Float64Array | None = None,
     ranges_m: Sequence[float] = RANGES_M,
-    is_planar: bool = True,
+    elevations: Float64Array | None = None,
 ) -> Float64Array:
     """(R, 2) range [m] and error [px] of the worst place in the image, at 95 %.
 
-    Var(u) = P [-[R p]x, I] C [..]' P' + Q C_K Q' with P = d pi / d p_C and Q = d pi / d K, D, at points of the scan plane
-    (of the whole image for a 3-D LiDAR). The error of a place is its larger axis times the quantile of a circle for two
+    Var(u) = P [-[R p]x, I] C [..]' P' + Q C_K Q' with P = d pi / d p_C and Q = d pi / d K, D, at points that beams can meet.
+    The error of a place is its larger axis times the quantile of a circle for two
     equal axes, of a line for one: it covers 95 % or more.
 
     Args:
         covariance: (6, 6) of T_camera_lidar. degrees: of freedom it was estimated with.
+        elevations: (2,) [rad] lowest and highest beam, 0 0 of a planar LiDAR; None: anything may be hit.
     """
     stretch = float(quantiles(np.array([degrees]))[0]) / 1.959963984540054
     table = []
+    beams = _beams(elevations)
     for range_m in ranges_m:
-        points = _seen_points(camera, T_camera_lidar, range_m, is_planar=is_planar)
+        points = _seen_points(camera, T_camera_lidar, range_m * beams)
         if not len(points):
             continue
         by_point = camera.point_jacobian(points)
@@ -57,18 +59,18 @@ def _radius_95(axes: Float64Array) -> Float64Array:
     return np.sqrt(large) * (1.959963984540054 + (2.447746830680816 - 1.959963984540054) * np.sqrt(small / large))
 
 
-def _seen_points(camera: Camera, T: Float64Array, range_m: float, *, is_planar: bool) -> Float64Array:
-    """Points of the camera frame at a range from the LiDAR that fall into the image."""
-    if is_planar:
-        azimuth = np.radians(np.arange(-180.0, 180.0, 2.0))
-        beams = np.column_stack([np.cos(azimuth), np.sin(azimuth), np.zeros_like(azimuth)])
-        points = range_m * beams @ T[:3, :3].T + T[:3, 3]
-    else:
-        u, v = np.meshgrid(np.linspace(0, camera.width - 1, _COLUMNS), np.linspace(0, camera.height - 1, _COLUMNS))
-        rays = camera.unproject(np.column_stack([u.ravel(), v.ravel()]))
-        along = rays @ T[:3, 3]
-        reach = along + np.sqrt(np.maximum(along**2 - T[:3, 3] @ T[:3, 3] + range_m**2, 0))
-        points = rays[np.isfinite(rays).all(axis=1)] * reach[np.isfinite(rays).all(axis=1), None]
+def _beams(elevations: Float64Array | None) -> Float64Array:
+    """(B, 3) unit vectors in the LiDAR frame, all around."""
+    low, high = (-np.pi / 2, np.pi / 2) if elevations is None else elevations
+    rows = max(_ROWS, int(np.degrees(high - low) / (2 * _STEP_DEG))) if high > low else 1
+    azimuth, elevation = np.meshgrid(np.radians(np.arange(-180.0, 180.0, _STEP_DEG)), np.linspace(low, high, rows))
+    flat = np.cos(elevation)
+    return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)], axis=-1).reshape(-1, 3)
+
+
+def _seen_points(camera: Camera, T: Float64Array, points: Float64Array) -> Float64Array:
+    """Points (K, 3) of the LiDAR in the camera frame, those that fall into the image."""
+    seen = points @ T[:3, :3].T + T[:3, 3]
     with np.errstate(invalid="ignore"):
-        inside = camera.is_inside(camera.project(points))
-    return np.asarray(points[inside])
+        inside = camera.is_inside(camera.project(seen))
+    return np.asarray(seen[inside])

@@ -63,6 +63,11 @@ class Placement:
         """
         return spread_of(self.rows, self.residuals, self.held)
 
+    def spread_along(self, directions: Float64Array) -> Spread:
+        """Uncertainty of directions'(turn, shift) for six independent directions (6, 6), when all six were free."""
+        back = np.linalg.inv(directions.T @ self.basis)
+        return spread_of(self.rows @ back, self.residuals, back.T @ self.held @ back)
+
 
 def fit(
     problem: Problem,

@@ -23,7 +23,9 @@ from wallkit.core.calibration import COVARIANCE_ORDER, Calibration, Provenance
 from wallkit.core.camera import Camera
 from wallkit.errors import CalibrationError, closest
 
-SCHEMA = 1
+SCHEMA = 2
+# 1 had no degrees of freedom and no elevations
+READABLE = (1, 2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +96,11 @@ def toml_from_calibration(calibration: Calibration) -> str:
             order = ", ".join(COVARIANCE_ORDER)
             lines += [f"# of {order} [rad, m], a perturbation from the left in the camera frame"]
             lines += ["covariance = [", *_rows(calibration.covariance), "]"]
+            lines += ["# of freedom of the covariance: its intervals are Student's t"]
+            lines += [f"degrees_of_freedom = {float(calibration.degrees)!r}"]
+        if calibration.elevations is not None:
+            lines += ["# lowest and highest beam above the LiDAR's xy plane"]
+            lines += [f"elevations_rad = {calibration.elevations.tolist()}"]
         lines += ["# t_camera = t_lidar + offset", f"time_offset_ns = {calibration.time_offset_ns}"]
         if calibration.time_offset_sigma_ns is not None:
             lines.append(f"time_offset_sigma_ns = {calibration.time_offset_sigma_ns!r}")
@@ -126,9 +133,10 @@ def _toml(text: str) -> Calibration:
         raise CalibrationError(f"is no TOML: {error}") from error
     if "camera" not in document:
         raise CalibrationError("has no [camera] table: it is no calibration")
-    if document.get("schema", SCHEMA) != SCHEMA:
+    if document.get("schema", SCHEMA) not in READABLE:
         hint = "it was written by another version of wallkit"
-        raise CalibrationError(f"schema = {document['schema']!r} is not known (this is {SCHEMA})", hint=hint)
+        known = " and ".join(map(str, READABLE))
+        raise CalibrationError(f"schema = {document['schema']!r} is not known (these are: {known})", hint=hint)
     stored, lidar, made = document["camera"], document.get("lidar", {}), document.get("provenance", {})
     needed = ("model", "width", "height", "fx", "fy", "cx", "cy", "D")
     missing = [key for key in needed if key not in stored]
@@ -150,6 +158,8 @@ def _toml(text: str) -> Calibration:
             T_camera_lidar=lidar.get("T_camera_lidar"),
             lidar_frame=lidar.get("frame", ""),
             covariance=lidar.get("covariance"),
+            degrees=float(lidar.get("degrees_of_freedom", np.inf)),
+            elevations=lidar.get("elevations_rad"),
             camera_covariance=stored.get("covariance"),
             time_offset_ns=lidar.get("time_offset_ns", 0),
             time_offset_sigma_ns=lidar.get("time_offset_sigma_ns"),

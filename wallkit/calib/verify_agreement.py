@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from wallkit.calib.agreement import Known, chance_of, solved, stated
 from wallkit.calib.evidence import Evidence, lidar_axes
 from wallkit.calib.gates import Gate, not_asked
 from wallkit.calib.observability import DEGREES_OF_FREEDOM
@@ -13,10 +14,12 @@ from wallkit.core.types import Float64Array
 
 # 80 % power at 5 %, two-sided
 _POWER = 2.8
+_FEW = 12
+_TEST = "t of six independent directions (p of their chi-square)"
 
 
 def urdf_gate(evidence: Evidence, limits: VerifyLimits) -> Gate:
-    """Whether the calibration and the URDF can both be right: chi-square of their difference, six degrees of freedom.
+    """Whether the calibration and the URDF can both be right: the test of `agreement` of their difference.
 
     It may only PASS where the calibration is sharp enough to have seen a difference that matters.
     """
@@ -24,20 +27,22 @@ def urdf_gate(evidence: Evidence, limits: VerifyLimits) -> Gate:
     if urdf is None or T is None:
         return not_asked(name, "no URDF was given" if urdf is None else "there is no transform")
     prior = f"prior {urdf.sigma_deg:g} deg, {urdf.sigma_mm:g} mm"
-    covariance = _cautious(evidence, urdf.T, T)
-    if covariance is None:
+    d = difference(urdf.T, T)
+    trusted = stated(np.diag(np.repeat([np.radians(urdf.sigma_deg), urdf.sigma_mm * 1e-3], 3) ** 2))
+    sides = _sides(evidence, T)
+    if not sides:
         return Gate(
             name, np.nan, "", f">= {limits.urdf_p:g}", "CANNOT TELL", "the calibration does not say how sure it is"
         )
-    d = difference(urdf.T, T)
-    trusted = np.diag(np.repeat([np.radians(urdf.sigma_deg), urdf.sigma_mm * 1e-3], 3) ** 2)
-    p = _p_value(d, covariance + trusted)
-    words = _axis_words(d, covariance + trusted)
+    p, covariance = max(
+        ((chance_of(d, [known, trusted]), known.covariance) for known in sides), key=lambda pair: pair[0]
+    )
+    words = _axis_words(d, covariance + trusted.covariance)
     wanted, refused = (
         f">= {limits.urdf_p:g}",
         f"< {limits.urdf_bad_p:g} and > {limits.urdf_deg:g} deg or {limits.urdf_mm:g} mm",
     )
-    basis = f"chi-square, {prior}"
+    basis = f"{_TEST}, {prior}"
     matters = np.degrees(np.abs(d[:3])).max() > limits.urdf_deg or 1e3 * np.abs(d[3:]).max() > limits.urdf_mm
     if p < limits.urdf_bad_p and matters:
         reason = f"the URDF disagrees: the boards put the LiDAR {words} from it ({prior})"
@@ -58,17 +63,19 @@ def boards_gate(evidence: Evidence, limits: VerifyLimits) -> Gate:
     name, T, fresh = "agreement with a fresh solve, p", evidence.place, evidence.fresh
     if T is None or fresh is None or fresh.covariance is None:
         return not_asked(name, "the views give no transform of their own")
-    spread = lidar_axes(fresh.T, fresh.covariance)
+    sides = [solved(fresh.placement)]
     if evidence.calibration.covariance is not None and np.abs(fresh.T - T).max() > 1e-9:
-        spread = spread + lidar_axes(T, evidence.calibration.covariance)
+        sides.append(stated(lidar_axes(T, evidence.calibration.covariance), evidence.calibration.degrees))
     d = difference(T, fresh.T)
-    p = _p_value(d, spread, degrees=float(sum(fresh.used) - 6))
+    # in the axes of the solve, whose degrees of freedom they are
+    p = chance_of(difference(fresh.T, T), sides)
+    spread = sum(side.covariance for side in sides[1:]) + sides[0].covariance
     words = _axis_words(d, spread)
     wanted, refused = (
         f">= {limits.urdf_p:g}",
         f"< {limits.urdf_bad_p:g} and > {limits.urdf_deg:g} deg or {limits.urdf_mm:g} mm",
     )
-    basis = "F-test, both covariances"
+    basis = f"{_TEST}, both covariances"
     matters = np.degrees(np.abs(d[:3])).max() > limits.urdf_deg or 1e3 * np.abs(d[3:]).max() > limits.urdf_mm
     if p < limits.urdf_bad_p and matters:
         reason = f"the boards of this log put the LiDAR {words} from where the calibration has it"
@@ -79,26 +86,13 @@ def boards_gate(evidence: Evidence, limits: VerifyLimits) -> Gate:
     return Gate(name, p, "", wanted, "PASS", "", refused, basis)
 
 
-def _cautious(evidence: Evidence, urdf: Float64Array, T: Float64Array) -> Float64Array | None:
-    """(6, 6) LiDAR-axes covariance of the calibration: of the file's and the fresh one, which lets more pass."""
-    d = difference(urdf, T)
-    known = [c for c in (evidence.covariance, evidence.fresh.covariance if evidence.fresh else None) if c is not None]
-    if evidence.calibration.covariance is not None and evidence.fresh is not None and len(evidence.kept) < 12:
-        known = [evidence.calibration.covariance]
-    turned = [lidar_axes(T, c) for c in known]
-    return min(turned, key=lambda c: float(d @ np.linalg.solve(c, d)), default=None)
-
-
-def _p_value(d: Float64Array, covariance: Float64Array, *, degrees: float = np.inf) -> float:
-    """Of a difference at least as unlikely: chi-square, or Hotelling's F where the covariance is an estimate."""
-    from scipy.special import chdtrc, fdtrc
-
-    squared = float(d @ np.linalg.solve(covariance, d))
-    if not np.isfinite(degrees) or degrees > 1e6:
-        return float(chdtrc(6, squared))
-    # Hotelling's T^2 with so many degrees of freedom of the covariance; fewer than 6 leave nothing to say
-    left = degrees - 5
-    return float(fdtrc(6, left, squared * left / (6 * degrees))) if left > 0 else 1.0
+def _sides(evidence: Evidence, T: Float64Array) -> list[Known]:
+    """What is known of the calibration: by its file and by the fresh solve, unless that has too few views to know."""
+    file, fresh = evidence.calibration, evidence.fresh
+    known = [] if evidence.covariance is None else [stated(lidar_axes(T, evidence.covariance), evidence.degrees)]
+    if file.covariance is not None and fresh is not None and len(evidence.kept) < _FEW:
+        return [stated(lidar_axes(T, file.covariance), file.degrees)]
+    return known + ([solved(fresh.placement)] if fresh is not None and fresh.covariance is not None else [])
 
 
 def _axis_words(d: Float64Array, covariance: Float64Array) -> str:

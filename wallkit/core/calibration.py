@@ -44,6 +44,9 @@ class Calibration:
         lidar_frame: name of the LiDAR's frame.
         covariance: (6, 6) of T_camera_lidar in the order (w_x w_y w_z t_x t_y t_z) [rad, m], a perturbation from the
             left in the camera frame: R <- Exp(w) R, t <- t + dt. None when not known.
+        degrees: of freedom of that covariance, of the axis that has fewest; inf where nobody counted them.
+        elevations: (2,) [rad] lowest and highest beam of the LiDAR above its xy plane, 0 0 of a planar one; None when not
+            known.
         camera_covariance: (4 + n, 4 + n) of `camera.parameters`, clustered by view; None when not known.
         time_offset_ns: t_camera = t_lidar + offset. time_offset_sigma_ns: None when it was not estimated.
         verdict: of `wallkit calib verify`; empty as long as nobody verified it.
@@ -59,6 +62,8 @@ class Calibration:
     T_camera_lidar: Float64Array | None = None
     lidar_frame: str = ""
     covariance: Float64Array | None = None
+    degrees: float = np.inf
+    elevations: Float64Array | None = None
     camera_covariance: Float64Array | None = None
     time_offset_ns: int = 0
     time_offset_sigma_ns: float | None = None
@@ -74,6 +79,9 @@ class Calibration:
             object.__setattr__(self, name, _checked_covariance(getattr(self, name), size, name))
         object.__setattr__(self, "T_camera_lidar", _checked_transform(self.T_camera_lidar))
         object.__setattr__(self, "pixel_error_95", _checked_table(self.pixel_error_95))
+        object.__setattr__(self, "elevations", _checked_elevations(self.elevations))
+        if not self.degrees > 0:
+            raise CalibrationError(f"degrees of freedom of the covariance are not positive: {self.degrees!r}")
 
     @property
     def camera_frame(self) -> str:
@@ -121,6 +129,16 @@ def _checked_covariance(given: ArrayLike | None, size: int, name: str) -> Float6
         raise CalibrationError(f"{name} is not symmetric with a positive diagonal")
     C.flags.writeable = False
     return C
+
+
+def _checked_elevations(given: ArrayLike | None) -> Float64Array | None:
+    if given is None:
+        return None
+    pair = np.array(given, dtype=np.float64)
+    if pair.shape != (2,) or not -np.pi / 2 <= pair[0] <= pair[1] <= np.pi / 2:
+        raise CalibrationError(f"elevations are not the lowest and the highest beam [rad]: {pair.tolist()}")
+    pair.flags.writeable = False
+    return pair
 
 
 def _checked_table(given: ArrayLike | None) -> Float64Array | None:

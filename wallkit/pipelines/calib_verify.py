@@ -22,7 +22,13 @@ from wallkit.errors import CalibrationError
 from wallkit.pipelines.calib_verify_camera import boards_of_camera
 from wallkit.pipelines.calib_verify_free import free_gates
 from wallkit.pipelines.calibrate_clock import with_clock
-from wallkit.pipelines.calibrate_extrinsics import ExtrinsicsRun, Gathered, SolveOptions, run_extrinsics
+from wallkit.pipelines.calibrate_extrinsics import (
+    ExtrinsicsRun,
+    Gathered,
+    SolveOptions,
+    elevations_of,
+    run_extrinsics,
+)
 from wallkit.pipelines.calibrate_files import PICTURES
 from wallkit.pipelines.calibrate_request import gather, prior_from_words
 from wallkit.pipelines.run_folder import sha256
@@ -119,8 +125,9 @@ def verify_calibration(
     looked_at = 0
     if request.board is None:
         gates, looked_at, is_planar = free_gates(request, calibration, progress)
-        evidence = replace(evidence, target_free=gates, is_planar=is_planar, why_no_fresh=_NO_BOARD)
-        evidence = with_pixel_error(evidence)
+        evidence = replace(evidence, target_free=gates, why_no_fresh=_NO_BOARD)
+        if evidence.elevations is None and is_planar:
+            evidence = with_pixel_error(replace(evidence, elevations=np.zeros(2)))
     elif _is_camera_alone(request):
         evidence, left_out, looked_at = boards_of_camera(
             evidence, request.inputs, request.board, request.image_topic, progress
@@ -160,8 +167,9 @@ def _with_boards(
     evidence: Evidence, gathered: Gathered, request: VerifyRequest
 ) -> tuple[Evidence, ExtrinsicsRun | None, list[tuple[str, str]]]:
     boards = tuple((pair.name, pair.pose) for pair in gathered.pairs)
-    is_planar = bool(gathered.pairs) and gathered.pairs[0].returns is not None
-    evidence = replace(evidence, boards=boards, is_planar=is_planar)
+    evidence = replace(evidence, boards=boards)
+    if evidence.elevations is None and gathered.pairs:
+        evidence = replace(evidence, elevations=elevations_of(gathered.pairs))
     left_out = [(item.name, item.why) for item in gathered.left_out]
     guess = evidence.place if evidence.place is not None else evidence.urdf.T if evidence.urdf else None
     options = SolveOptions(evidence.sigma_range_m, evidence.sigma_source, guess, None, "auto", request.seed)

@@ -24,6 +24,8 @@ from wallkit.errors import CalibrationError
 
 # a guess that finds fewer of the boards than this is not believed
 _TRUSTED_SHARE = 0.6
+# nearer returns are the robot itself
+_NEAREST_M = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +137,8 @@ class ExtrinsicsRun:
             T_camera_lidar=self.result.T,
             lidar_frame=self.gathered.lidar_frame,
             covariance=self.result.covariance,
+            degrees=self.result.degrees,
+            elevations=elevations_of(self.gathered.pairs),
             camera_covariance=self.gathered.camera_covariance,
             time_offset_ns=self.gathered.time_offset_ns,
             time_offset_sigma_ns=self.gathered.time_offset_sigma_ns,
@@ -182,7 +186,7 @@ def run_extrinsics(gathered: Gathered, options: SolveOptions) -> ExtrinsicsRun:
             result.covariance,
             degrees=result.degrees,
             camera_covariance=gathered.camera_covariance,
-            is_planar=is_planar,
+            elevations=elevations_of(gathered.pairs),
         )
     return ExtrinsicsRun(
         gathered=gathered,
@@ -264,6 +268,16 @@ def _with_sides(
         patch = find_patch(pair.points_m, size, rings=pair.rings, guess=guess, seed=options.seed)
         out.append(replace(sighting, faces=(sighting.faces[0], *side_faces(patch, sighting.board, plate, T))))
     return out
+
+
+def elevations_of(pairs: Sequence[Pair]) -> Float64Array:
+    """(2,) [rad] lowest and highest return above the LiDAR's xy plane: 0 0 of a planar one, else as the clouds show it."""
+    if pairs[0].returns is not None:
+        return np.zeros(2)
+    points = np.concatenate([pair.points_m[:, :3] for pair in pairs])
+    far = np.linalg.norm(points, axis=1) > _NEAREST_M
+    above = np.arctan2(points[far, 2], np.hypot(points[far, 0], points[far, 1]))
+    return np.array([above.min(), above.max()]) if len(above) else np.array([-np.pi / 2, np.pi / 2])
 
 
 def outline_of(board: Board) -> tuple[Float64Array, bool]:
