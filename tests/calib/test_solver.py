@@ -128,7 +128,8 @@ def test_few_views_say_what_the_noise_promises_or_more():
     [(True, 12, 1.0), (True, 20, 2.0), (True, 40, 1.0), (False, 12, 2.0), (False, 20, 1.0), (False, 40, 2.0)],
 )
 def test_intervals_hold_the_truth(planar, views, excess):
-    """Of each axis, of all six at once and of two solves, in 60 worlds: 92 to 98 %, give or take three standard errors (3.5 and 1.8 %); `wallkit bench covariance` runs 500."""
+    """Of each axis, of all six at once and of two solves, in 60 worlds: 92 to 98 %, give or take three standard errors
+    (3.5 and 1.8 %); `wallkit bench covariance` runs 500."""
     found = coverage(World(is_planar=planar, excess=excess), views, 60)
     assert found.is_honest, found
     if excess > 1:

@@ -2,7 +2,7 @@
 
 Hotelling's T^2 needs the whole 6 x 6 covariance, and CR2 from 12 views has about five degrees of freedom for it: taken as
 known it holds the truth 40 to 80 % of the time instead of 95, with G - 6 degrees 84 to 93, and with the honest number (HTZ:
-Pustejovsky and Tipton 2018) it can say nothing below 20 views. What the views do know well is one direction at a time. So the
+Pustejovsky and Tipton 2018) it can say nothing below 20 views. What the views know well is one direction at a time. So the
 difference is taken apart along six directions that err independently when everything errs as declared; each gets
 Student's t with its own degrees of freedom, as the intervals do, is turned into a normal score of the same probability, and
 the sum of the squared scores is a chi-square of six. `wallkit bench covariance` counts how often that is right.

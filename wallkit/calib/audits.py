@@ -9,6 +9,7 @@ import numpy as np
 
 from wallkit.calib.covariance import spread_of
 from wallkit.calib.extrinsics import Extrinsics
+from wallkit.calib.planar import PLANAR, planar_placement
 from wallkit.calib.sightings import Problem, Sighting, jacobian, problem_from_sightings, residuals, whiteners
 from wallkit.calib.solver import Placement, fit
 from wallkit.core.types import Float64Array
@@ -38,10 +39,13 @@ class Audit:
 def square_size(result: Extrinsics, sightings: Sequence[Sighting], *, square_m: float) -> Audit:
     """How large the squares are by the LiDAR's ruler: kappa times as large as declared."""
     used = [s for s, use in zip(sightings, result.used, strict=True) if use]
-    kappa, sigma, T = 1.0, np.nan, result.T
+    kappa, sigma, T, basis = 1.0, np.nan, result.T, result.placement.basis
+    if result.kind == "refused" and all(s.faces[0].directions == 1 for s in used):
+        # wrong squares blow up the misfit until a planar LiDAR's yaw counts as unseen; six open directions fit any size
+        T, basis = planar_placement(problem_from_sightings(used)).T, PLANAR
     for _ in range(_ROUNDS):
         problem = problem_from_sightings([replace(s, board=s.board.scaled(kappa)) for s in used])
-        here = fit(problem, T, basis=result.placement.basis, rounds=3)
+        here = fit(problem, T, basis=basis, rounds=3)
         T = here.T
         step, sigma = _extra(
             here, problem, -problem.weights * np.einsum("gkc,gc->gk", problem.normals, problem.origins)

@@ -50,8 +50,8 @@ class Coverage:
 
     @property
     def is_honest(self) -> bool:
-        """Whether every unknown and all six are covered 92 to 98 times of 100 (two solves: 90); with fewer than 500 seeds +- three standard errors
-        (36 numbers are compared in a table, of which one is two off by chance)."""
+        """Whether every unknown and all six are covered 92 to 98 times of 100 (two solves: 90); with fewer than 500 seeds
+        +- three standard errors (36 numbers are compared in a table, of which one is two off by chance)."""
         low, high = (3 * np.sqrt(p * (1 - p) / self.seeds) if self.seeds < 500 else 0.0 for p in (LOWEST, HIGHEST))
         shares = np.array([*self.covered, self.joint, self.agreed])
         lowest = np.array([LOWEST] * 7 + [LOWEST_OF_TWO])

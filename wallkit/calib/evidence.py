@@ -33,7 +33,8 @@ class Evidence:
         calibration: under judgement.
         boards: by name of the picture, every board that was seen.
         sightings: those that the LiDAR saw too. views: how each fits a calibration without it. held_out: in words.
-        elevations: (2,) [rad] lowest and highest beam of the LiDAR, as the file or this input has it. sigma_range_m: of a range, declared or from a data sheet; sigma_source says which.
+        elevations: (2,) [rad] lowest and highest beam of the LiDAR, as the file or this input has it.
+        sigma_range_m: of a range, declared or from a data sheet; sigma_source says which.
         fresh: a solve from these sightings alone; None when they are too few.
         why_no_fresh: what is in the way.
         covariance: (6, 6) of T_camera_lidar as in `Calibration`, that of the file or of the fresh solve, whichever counts;

@@ -39,8 +39,8 @@ def covariance(
 
     Every world has a mounting, boards and noise of its own; each board pose errs as a whole. The clustered intervals must
     hold the truth 92 to 98 times of 100, and so must the test of all six axes at once that `calib verify` uses; between two
-    solves, of which one is known by what its file says, 90 will do. The columns beside them are what two simpler ways would have reached: the noise
-    as declared, and (J'J)^-1 over points.
+    solves, of which one is known by what its file says, 90 will do. The columns beside them are what two simpler ways
+    would have reached: the noise as declared, and (J'J)^-1 over points.
 
     Exits 0 if they do, 1 if not.
 
