@@ -1,0 +1,115 @@
+"""Images are segmented ahead, once each, in order, and skipped by stamps alone."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import pytest
+
+from wallkit.core.types import CameraImage, Frame, Points
+from wallkit.segment.ahead import LookReport, look_ahead
+from wallkit.segment.class_map import class_map
+
+EMPTY = np.zeros(0, dtype=np.float32)
+
+
+def frame(stamp_ms: int, image_ms: int | None) -> Frame:
+    points = Points(
+        stamp_ms * 10**6, np.zeros((0, 3), np.float32), EMPTY, np.zeros(0, np.int64), np.zeros(2), 10.0, EMPTY
+    )
+    image = None if image_ms is None else CameraImage(image_ms * 10**6, "camera", "jpeg", b"")
+    return Frame(stamp_ms * 10**6, points, np.zeros(3), image=image)
+
+
+def answer(image: CameraImage):
+    """A picture of one pixel that says its own time."""
+    return class_map(np.array([[image.stamp_ns // 10**6 % 1000]]), tuple(str(n) for n in range(1000)))
+
+
+def shown(pairs) -> list[int | None]:
+    return [None if seen is None else int(seen.segmentation.labels()[0, 0]) for _, seen in pairs]
+
+
+def test_every_frame_comes_in_order_with_its_own_image():
+    frames = [frame(k * 100, k * 100 + 3) for k in range(8)]
+    pairs = list(look_ahead(frames, answer))
+    assert [f for f, _ in pairs] == frames
+    assert shown(pairs) == [k * 100 + 3 for k in range(8)]
+    assert all(seen.stamp_ns == f.image.stamp_ns for f, seen in pairs)
+
+
+def test_the_next_images_are_looked_at_while_a_frame_is_worked_on():
+    begun = {k: threading.Event() for k in range(6)}
+
+    def look(image):
+        begun[image.stamp_ns // 10**8].set()
+        return answer(image)
+
+    for k, (_, seen) in enumerate(look_ahead([frame(k * 100, k * 100) for k in range(6)], look, frames_ahead=2)):
+        assert seen is not None
+        assert all(begun[j].wait(timeout=30) for j in range(k, min(k + 3, 6)))
+        assert not any(begun[j].is_set() for j in range(k + 3, 6))
+
+
+def test_an_image_that_scans_share_is_looked_at_once():
+    report, calls = LookReport(), []
+
+    def look(image):
+        calls.append(image.stamp_ns)
+        return answer(image)
+
+    frames = [frame(k * 25, k // 4 * 100) for k in range(12)]
+    assert shown(look_ahead(frames, look, report=report)) == [0] * 4 + [100] * 4 + [200] * 4
+    assert len(calls) == 3
+    assert report == LookReport(looked=3)
+
+
+@pytest.mark.parametrize(("rate_hz", "expected"), [(5, 2), (10 / 3, 3), (2.5, 4), (1, 10), (10, 1), (100, 1)])
+def test_images_are_skipped_by_rate_also_when_their_stamps_jitter(rate_hz, expected):
+    rng = np.random.default_rng(3)
+    stamps = (np.arange(40) * 100 + rng.integers(-8, 9, size=40) + 500).tolist()
+    report = LookReport()
+    found = shown(look_ahead([frame(t, t) for t in stamps], answer, rate_hz=rate_hz, report=report))
+    assert [k for k, what in enumerate(found) if what is not None] == list(range(0, 40, expected))
+    assert report.looked + report.by_rate == 40
+
+
+def test_images_are_skipped_when_they_are_not_needed_and_that_costs_no_slot():
+    report = LookReport()
+    frames = [frame(k * 100, k * 100) for k in range(6)]
+    needed = look_ahead(frames, answer, rate_hz=5, is_needed=lambda f: f.stamp_ns >= 10**8, report=report)
+    assert shown(needed) == [None, 100, None, 300, None, 500]
+    assert report == LookReport(looked=3, by_rate=2, by_need=1)
+
+
+def test_an_image_that_the_next_scan_needs_is_looked_at_after_all():
+    report = LookReport()
+    frames = [frame(0, 0), frame(25, 0), frame(50, 0)]
+    assert shown(look_ahead(frames, answer, is_needed=lambda f: f.stamp_ns > 0, report=report)) == [None, 0, 0]
+    assert report == LookReport(looked=1)
+
+
+def test_without_an_image_and_unreadable_ones_are_counted():
+    report = LookReport()
+    frames = [frame(0, None), frame(100, 100), frame(110, 100), frame(200, 200)]
+    look = lambda image: None if image.stamp_ns == 10**8 else answer(image)  # noqa: E731
+    assert shown(look_ahead(frames, look, report=report)) == [None, None, None, 200]
+    assert report == LookReport(looked=1, unreadable=1, without_image=1)
+    assert report.lines() == ["1 images segmented", "1 images that could not be read", "1 scans without an image"]
+
+
+def test_an_error_of_the_thread_reaches_the_caller():
+    def look(_):
+        raise ValueError("broken")
+
+    with pytest.raises(ValueError, match="broken"):
+        list(look_ahead([frame(0, 0)], look))
+
+
+def test_leaving_early_ends_the_thread():
+    before = threading.active_count()
+    walk = look_ahead((frame(k * 100, k * 100) for k in range(1000)), answer)
+    next(walk)
+    walk.close()
+    assert threading.active_count() == before
