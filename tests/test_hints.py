@@ -18,7 +18,20 @@ _COMMAND = re.compile(r"\bwallkit((?: [a-z][a-z-]*)+)([^;`]*)")
 # what is told of another program, up to the end of the sentence
 _OTHERS = re.compile(r"\b(?:apt-get|pip) [^;]*")
 # commands and flags of rooms that are being built; each goes from here when it lands
-COMING = {"calib from-urdf", "calib intrinsics", "calib extrinsics", "calib verify", "--board", "--image", "--model"}
+COMING = {
+    "calib from-urdf",
+    "calib intrinsics",
+    "calib extrinsics",
+    "calib verify",
+    "--board",
+    "--image",
+    "--model",
+    "model export",
+    "model train",
+    "model bench",
+    "model verify",
+    "model quantize",
+}
 _FLAG = re.compile(r"(?<![\w-])--[a-z][a-z-]+")
 
 

@@ -16,6 +16,7 @@ from wallkit.cli.evaluate import compare, evaluate, report
 from wallkit.cli.localize import localize
 from wallkit.cli.log import log
 from wallkit.cli.map import map_group
+from wallkit.cli.model import model
 from wallkit.cli.simulate import simulate
 
 
@@ -35,7 +36,7 @@ def main() -> None:
 
 
 COMMANDS = (
-    *(demo, log, map_group, calib, localize, evaluate, compare, report, simulate, dataset),
+    *(demo, log, map_group, calib, model, localize, evaluate, compare, report, simulate, dataset),
     *(bench, config, completion, doctor),
 )
 for command in COMMANDS:

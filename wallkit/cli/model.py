@@ -1,0 +1,17 @@
+"""`wallkit model`: the words that can follow."""
+
+from __future__ import annotations
+
+import click
+
+from wallkit.cli.model_fixture import fixture
+from wallkit.cli.model_inspect import inspect
+
+
+@click.group()
+def model() -> None:
+    """Judge, compare, shrink and make the segmentation models that look at the camera's pictures."""
+
+
+for command in (inspect, fixture):
+    model.add_command(command)
