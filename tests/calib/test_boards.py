@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
+from wallkit.calib import detect
 from wallkit.calib.boards import Board, board_from, opencv_board
 from wallkit.calib.bundle import homography
 from wallkit.calib.detect import find_corners, find_roughly
@@ -124,6 +125,18 @@ def test_the_half_window_follows_the_corner_spacing():
         return np.abs(shift - np.median(shift, axis=0)).max()
 
     assert worst(found.pixels) < 0.1 < worst(wide.pixels)
+
+
+def test_a_corner_that_begins_beside_its_window_is_found_between_the_others(monkeypatch):
+    """OpenCV's refinement gives up silently there, and the corner would stay pixels away from its place."""
+    board = board_from("chessboard:7x5:0.03")
+    grey = cv2.GaussianBlur(drawn(sheet_of(board)), (0, 0), 1.0)
+    right = find_corners(grey, board).pixels
+    rough = right + np.random.default_rng(0).normal(0, 0.4, right.shape)
+    rough[[3, 17]] += (13.0, -14.0)
+    monkeypatch.setitem(detect._FINDERS, "chessboard", lambda grey, board: (np.arange(35), rough))
+    found = find_corners(grey, board).pixels
+    np.testing.assert_allclose(found, right, atol=0.05)
 
 
 def test_svg_and_pdf_say_the_size_and_the_board_and_are_the_same_twice():

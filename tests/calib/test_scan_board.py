@@ -51,6 +51,18 @@ def test_finds_the_board_near_a_guess():
     assert len(found) > 0.9 * len(true)
 
 
+def test_noise_does_not_tear_a_board_into_pieces():
+    """A hundred noisy beams on a board have a jump of four sigmas somewhere in half of the scans; the line stays whole."""
+    rng = np.random.default_rng(3)
+    board = pose(0.1, 0.05, 1.8, pitch_deg=10, yaw_deg=-35)
+    whole = []
+    for _ in range(60):
+        points, met = room_scan(rng, board, sigma=0.015, step_deg=0.25)
+        trace = find_trace(returns_of_points(points), board, PLATE, T, sigma_range_m=0.01)
+        whole.append(trace.why == "" and len(trace.points_m) > 0.85 * met.sum())
+    assert sum(whole) >= 59
+
+
 @pytest.mark.parametrize("turn_deg", [0.0, 140.0])
 def test_finds_every_board_from_nothing(turn_deg):
     """However the LiDAR is turned about its axis, the boards of a capture tell."""

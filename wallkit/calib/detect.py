@@ -18,6 +18,8 @@ WINDOW_PER_SPACING = 0.3
 _SMALLEST, _LARGEST = 2, 11
 _STOP = (3, 50, 1e-3)
 _FEWEST_CORNERS = 6
+# a corner that was lost is looked for where so many others put it
+_NEIGHBOURS = 8
 _QUICK_WIDTH = 320
 
 
@@ -51,8 +53,10 @@ def find_corners(grey: UInt8Array, board: Board, *, half_window: int | None = No
     if found is None or len(found[0]) < _FEWEST_CORNERS:
         return None
     ids, pixels = found
-    if board.kind == "chessboard" or half_window:
-        pixels = _refined(grey, pixels, half_window or _half_window(_spacing(pixels)))
+    if board.kind == "chessboard":
+        pixels = _refined_together(grey, pixels, board, half_window or _half_window(_spacing(pixels)))
+    elif half_window:
+        pixels = _refined(grey, pixels, half_window)
     return Corners(ids, pixels, _spacing(pixels), sharpness(grey, pixels))
 
 
@@ -87,7 +91,7 @@ def find_quickly(grey: UInt8Array, board: Board, *, is_thorough: bool) -> Corner
         rough = None if found is None else found[1]
     if rough is None:
         return None
-    pixels = _refined(grey, rough, _half_window(_spacing(rough)))
+    pixels = _refined_together(grey, rough, board, _half_window(_spacing(rough)))
     return Corners(np.arange(len(pixels)), pixels, _spacing(pixels), sharpness(grey, pixels))
 
 
@@ -113,6 +117,27 @@ def _spacing(pixels: Float64Array) -> float:
 
     distances, _ = cKDTree(pixels).query(pixels, k=2)
     return float(distances[:, 1].min())
+
+
+def _refined_together(grey: UInt8Array, pixels: Float64Array, board: Board, half_window: int) -> Float64Array:
+    """Corners of a whole chessboard, refined; one whose start was outside its window starts again between the others.
+
+    OpenCV leaves such a corner where it was, pixels beside its place, and does not say so.
+    """
+    import cv2
+
+    refined = _refined(grey, pixels, half_window)
+    starts = pixels.copy()
+    cells = board.object_points[:, :2] / board.square_m
+    stuck = np.flatnonzero((refined == pixels.astype(np.float32)).all(axis=1))
+    for corner in stuck:
+        near = np.argsort(((cells - cells[corner]) ** 2).sum(axis=1), kind="stable")[1 : 1 + _NEIGHBOURS]
+        H, _ = cv2.findHomography(cells[near] - cells[corner], refined[near], cv2.LMEDS)
+        if H is not None:
+            starts[corner] = H[:2, 2] / H[2, 2]
+    if len(stuck):
+        refined[stuck] = _refined(grey, starts[stuck], half_window)
+    return refined
 
 
 def _refined(grey: UInt8Array, pixels: Float64Array, half_window: int) -> Float64Array:

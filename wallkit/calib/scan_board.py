@@ -116,10 +116,10 @@ def find_trace(
     ends = _wrapped(np.arctan2(chord[:, 1], chord[:, 0]) - middle)
     off = (points @ T[:3, :3].T + T[:3, 3]) @ board.normal - board.distance_m
     near = (bearings > ends.min() - margin_rad) & (bearings < ends.max() + margin_rad) & (np.abs(off) < near_m)
-    run = _longest_run(points, np.flatnonzero(near), returns.step_rad)
+    run = _longest_run(points, np.flatnonzero(near), returns.step_rad, sigma_range_m)
     length = float(np.linalg.norm(chord[1] - chord[0]))
     longest = 1.2 * length + 0.02 if plate_is_known else np.inf
-    return _judged(returns, _on_a_line(points, run), length, longest, sigma_range_m)
+    return _judged(returns, _on_a_line(points, run, sigma_range_m), length, longest, sigma_range_m)
 
 
 def traces_without_guess(
@@ -203,32 +203,36 @@ def _chord(T_lidar_board: Float64Array, plate: Float64Array) -> Float64Array | N
     return np.array(ends) if len(ends) == 2 else None
 
 
-def _longest_run(points: Float64Array, chosen: Int64Array, step_rad: float) -> Int64Array:
-    """Indices of the longest run without a gap wider than 6 cm or three beams."""
+def _longest_run(points: Float64Array, chosen: Int64Array, step_rad: float, sigma_m: float) -> Int64Array:
+    """Indices of the longest run without a gap wider than 6 cm or three beams, beyond what noise tears apart."""
     if len(chosen) < 2:
         return chosen
     gaps = np.linalg.norm(np.diff(points[chosen], axis=0), axis=1)
-    limit = np.maximum(0.06, 3 * np.linalg.norm(points[chosen[1:]], axis=1) * step_rad)
+    # two ranges differ by sqrt(2) sigma; with a hundred beams on a board some pair does by five times that
+    limit = np.maximum(0.06, 3 * np.linalg.norm(points[chosen[1:]], axis=1) * step_rad) + 5 * np.sqrt(2) * sigma_m
     runs = np.split(chosen, np.flatnonzero(gaps > limit) + 1)
     return max(runs, key=len)
 
 
-def _on_a_line(points: Float64Array, run: Int64Array) -> Int64Array:
-    """Of a run those within 2 cm of the line that most of them share, every pair being tried; refitted to all of them."""
+def _on_a_line(points: Float64Array, run: Int64Array, sigma_m: float) -> Int64Array:
+    """Of a run those on the line that most of them share, every pair being tried; refitted to all of them.
+
+    On it is within 2 cm, or three sigmas: a narrower strip throws good returns away.
+    """
     if len(run) < FEWEST:
         return run
-    xy = points[run, :2]
+    xy, strip = points[run, :2], max(LINE_M, 3 * sigma_m)
     i, j = np.triu_indices(len(xy), k=max(2, len(xy) // 4))
     if len(i) > 4000:
         i, j = i[:: len(i) // 4000 + 1], j[:: len(j) // 4000 + 1]
     along = xy[j] - xy[i]
     normals = np.column_stack([-along[:, 1], along[:, 0]]) / np.linalg.norm(along, axis=1, keepdims=True)
     off = np.abs(xy @ normals.T - (xy[i] * normals).sum(axis=1))
-    kept = off[:, int((off < LINE_M).sum(axis=0).argmax())] < LINE_M
+    kept = off[:, int((off < strip).sum(axis=0).argmax())] < strip
     for _ in range(3):
         middle = xy[kept].mean(axis=0)
         normal = np.linalg.svd(xy[kept] - middle, full_matrices=False)[2][1]
-        kept = np.abs((xy - middle) @ normal) < LINE_M
+        kept = np.abs((xy - middle) @ normal) < strip
     return np.asarray(run[kept])
 
 
