@@ -40,8 +40,10 @@ from wallkit.simulate.textures import Texture
 from wallkit.simulate.world import upright
 
 _HELD_NS, _EVERY_NS = 2_000_000_000, 500_000_000
-# a square's side on the picture of the board; edges are drawn by the share of a pixel they cover
-_PX_PER_SQUARE, _MOST_PX = 96, 4000
+# pixels of the renderer in one of the camera, each way
+_FINE = 2
+# a square's side on the picture of the board, a power of two
+_PX_PER_SQUARE, _MOST_PX = 128, 4096
 _PAPER, _INK = 235, 18
 
 
@@ -110,7 +112,7 @@ def captures(request: BoardRequest, robot: Robot, unit: Unit) -> Iterator[Held]:
     size = np.ptp(plate, axis=0)[:2]
     look = "the board"
     world = board_room((float(size[0]), float(size[1])), look)
-    printed = Surface(board_picture(board), fits=True, shine=0.0)
+    printed = Surface(board_picture(board), shine=0.0)
     wardrobe = Wardrobe(world, request.scenario.looks, request.seed, own={look: printed})
     T_map_base = upright(-1.5, 0.0, 0.0)
     T_lidar = T_map_base @ robot.frames[robot.lidar_frame(setup.frame)] @ _leaning(setup)
@@ -119,7 +121,7 @@ def captures(request: BoardRequest, robot: Robot, unit: Unit) -> Iterator[Held]:
     T_board_body = np.eye(4)
     T_board_body[:3, 3] = plate.mean(axis=0)
     scene = Scene(world)
-    with contextlib.closing(Studio(wardrobe)) as studio:
+    with contextlib.closing(Studio(wardrobe, fine=_FINE)) as studio:
         for number, T_map_board in enumerate(held):
             bodies = {BOARD: T_map_board @ T_board_body, STAND: stand_under(T_map_board, plate)}
             scene.place(bodies)
@@ -135,20 +137,32 @@ def captures(request: BoardRequest, robot: Robot, unit: Unit) -> Iterator[Held]:
 
 
 def board_picture(board: Board) -> Texture:
-    """The plate's front, upright: ink where the board is black, every edge where it is to a thousandth of a pixel."""
+    """The plate's front, upright: ink where the board is black.
+
+    Squares are a power of two pixels wide and begin where pixels do, in every size that a renderer shrinks the picture to:
+    an edge within a pixel would be drawn up to a tenth of one beside its place, which at arm's length is half a
+    millimetre of a board's distance.
+    """
     low, high = board.plate_corners[0, :2], board.plate_corners[2, :2]
-    scale = min(_PX_PER_SQUARE / board.square_m, _MOST_PX / float(np.max(high - low)))
-    width, height = np.maximum(np.round((high - low) * scale), 8).astype(int)
-    # pixels per metre differ a little, so that the picture ends where the plate does
-    sx, sy = width / (high[0] - low[0]), height / (high[1] - low[1])
+    unit = board.square_m + board.gap_m
+    begin = -np.ceil(-low / unit - 1e-9)
+    squares = np.ceil(high / unit - 1e-9) - begin
+    side = _PX_PER_SQUARE
+    while side > 8 and squares.max() * side > _MOST_PX:
+        side //= 2
+    width, height = (squares * side).astype(int)
     ink = np.zeros((height, width), dtype=np.float32)
     for x, y, w, h in black_rectangles(board).tolist():
-        columns = _covered(width, (x - low[0]) * sx, (x + w - low[0]) * sx)
-        rows = _covered(height, (y - low[1]) * sy, (y + h - low[1]) * sy)
+        columns = _covered(width, (x / unit - begin[0]) * side, ((x + w) / unit - begin[0]) * side)
+        rows = _covered(height, (y / unit - begin[1]) * side, ((y + h) / unit - begin[1]) * side)
         a, b = np.flatnonzero(rows)[[0, -1]], np.flatnonzero(columns)[[0, -1]]
         ink[a[0] : a[1] + 1, b[0] : b[1] + 1] += np.outer(rows[a[0] : a[1] + 1], columns[b[0] : b[1] + 1])
     grey = np.round(_PAPER + np.minimum(ink, 1) * (_INK - _PAPER)).astype(np.uint8)
-    return Texture(np.repeat(grey[..., None], 3, axis=2), (float(high[0] - low[0]), float(high[1] - low[1])))
+    size = squares * unit
+    left, below = low - begin * unit, (begin + squares) * unit - high
+    return Texture(
+        np.repeat(grey[..., None], 3, axis=2), (float(size[0]), float(size[1])), (float(left[0]), float(below[1]))
+    )
 
 
 def _covered(count: int, first: float, last: float) -> np.ndarray:

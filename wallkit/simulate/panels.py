@@ -40,14 +40,16 @@ class Panel:
     room: str
     start_m: tuple[float, float]
 
-    def grid(self, texture_m: tuple[float, float] | None) -> tuple[Float64Array, Int64Array, Float64Array]:
+    def grid(
+        self, texture_m: tuple[float, float] | None, begins_m: tuple[float, float] = (0.0, 0.0)
+    ) -> tuple[Float64Array, Int64Array, Float64Array]:
         """Vertices (V, 3), triangles (M, 3) and texture coordinates (V, 2), (0, 0) the picture's upper left corner.
 
         Light is computed at vertices, so large panels are divided. Without a texture's size it fills the panel once.
         """
         low, high = np.zeros(2), np.ones(2)
         if texture_m is not None:
-            low = np.array(self.start_m) / texture_m
+            low = (np.array(self.start_m) + begins_m) / texture_m
             high = low + np.array(self.size_m) / texture_m
         columns, rows = (max(1, min(_MOST_CELLS, int(np.ceil(side / _CELL_M)))) for side in self.size_m)
         u, v = (g.ravel()[:, None] for g in np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0, 1, rows + 1)))

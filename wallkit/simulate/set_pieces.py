@@ -77,8 +77,9 @@ def _box(wardrobe: Wardrobe, number: int) -> Iterator[Piece]:
 
 
 def _piece(number: int, surface: Surface, panels: list[Panel]) -> Piece:
-    size = None if surface.fits or surface.texture is None else surface.texture.size_m
-    vertices, triangles, uvs = zip(*(panel.grid(size) for panel in panels), strict=True)
+    texture = None if surface.fits else surface.texture
+    place = (None,) if texture is None else (texture.size_m, texture.begins_m)
+    vertices, triangles, uvs = zip(*(panel.grid(*place) for panel in panels), strict=True)
     before = np.cumsum([0, *(len(part) for part in vertices[:-1])])
     joined = np.concatenate([part + offset for part, offset in zip(triangles, before, strict=True)])
     return Piece(number, surface, np.concatenate(vertices), joined, np.concatenate(uvs))

@@ -18,10 +18,14 @@ Colour = tuple[float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class Texture:
-    """pixels (h, w, 3) RGB, row 0 on top; size_m (width, height) of the piece of surface it shows."""
+    """pixels (h, w, 3) RGB, row 0 on top; size_m (width, height) of the piece of surface it shows.
+
+    begins_m: where on it, right and up from its lower left corner, the surface begins.
+    """
 
     pixels: UInt8Array
     size_m: tuple[float, float]
+    begins_m: tuple[float, float] = (0.0, 0.0)
 
 
 Make = Callable[[np.random.Generator, Colour], Texture]
