@@ -1,0 +1,224 @@
+"""Points and polygons with holes -> which polygon each point lies in, by crossing number, winding number, even-odd or mask.
+
+All four agree but for points on an edge (Hormann & Agathos 2001), where rounding decides; the mask is as coarse as its pixels.
+They agree as long as the rings of a polygon do not cross each other or themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from wallkit.core.types import Float64Array, Int64Array
+
+Int32Array = NDArray[np.int32]
+OUTSIDE = -1
+
+
+@dataclass(frozen=True, eq=False)
+class Polygons:
+    """Polygons as the kernels take them.
+
+    Attributes:
+        edges: (5, E) float64: x, y of where each edge begins, x, y of where it ends, and dx / dy (0 where dy is).
+        starts: (P + 1,) int64, edges of polygon p are starts[p] ... starts[p + 1] - 1.
+        boxes: (P, 4) float64 lowest x, lowest y, highest x, highest y.
+    """
+
+    edges: Float64Array
+    starts: Int64Array
+    boxes: Float64Array
+
+    def __len__(self) -> int:
+        return len(self.boxes)
+
+
+def packed(polygons: Sequence[Sequence[ArrayLike]]) -> Polygons:
+    """Polygons given as rings (V, 2) each, the outline first, then its holes; whichever way they run, closed or not.
+
+    A ring of fewer than three corners holds nothing.
+    """
+    pieces: list[Float64Array] = []
+    starts, boxes = [0], []
+    total = 0
+    for rings in polygons:
+        box = np.array([np.inf, np.inf, -np.inf, -np.inf])
+        for number, ring in enumerate(rings):
+            corners = np.asarray(ring, dtype=np.float64).reshape(-1, 2)
+            if len(corners) < 3:
+                continue
+            ends = np.concatenate([corners[1:], corners[:1]])
+            # outlines run one way and holes the other, so that they cancel in the winding number
+            area = float(corners[:, 0] @ ends[:, 1] - corners[:, 1] @ ends[:, 0])
+            begins, ends = (corners, ends) if (area > 0) == (number == 0) else (ends, corners)
+            pieces.append(np.concatenate([begins.T, ends.T]))
+            total += len(corners)
+            if number == 0:
+                box = np.concatenate([corners.min(axis=0), corners.max(axis=0)])
+        starts.append(total)
+        boxes.append(box)
+    edges = np.zeros((5, total))
+    if pieces:
+        edges[:4] = np.concatenate(pieces, axis=1)
+        rise = edges[3] - edges[1]
+        edges[4] = (edges[2] - edges[0]) / np.where(rise == 0, np.inf, rise)
+    return Polygons(edges, np.array(starts, dtype=np.int64), np.array(boxes, dtype=np.float64).reshape(-1, 4))
+
+
+def crossing_number(points: ArrayLike, polygons: Polygons) -> Int64Array:
+    """(K,) the first polygon that each point (K, 2) lies in, OUTSIDE without one; NaN is outside.
+
+    A ray to the right crosses the edges of a polygon an odd number of times from inside (Sunday 2001, cn_PnPoly).
+    """
+    return _located(_crossing, points, polygons)
+
+
+def winding_number(points: ArrayLike, polygons: Polygons) -> Int64Array:
+    """As `crossing_number`: the polygon winds round the point a number of times that is not 0 (Sunday 2001, wn_PnPoly)."""
+    return _located(_winding, points, polygons)
+
+
+def even_odd(points: ArrayLike, polygons: Polygons) -> Int64Array:
+    """As `crossing_number`: every edge that the ray meets changes sides, edge by edge (Franklin 1970, PNPOLY)."""
+    return _located(_even_odd, points, polygons)
+
+
+def mask_lookup(points: ArrayLike, polygons: Polygons) -> Int64Array:
+    """As `crossing_number`, at the pixel's centre that is nearest to the point, from a mask drawn for this call."""
+    if not len(polygons):
+        return np.full(len(np.asarray(points).reshape(-1, 2)), OUTSIDE)
+    low, high = np.floor(polygons.boxes[:, :2].min(axis=0)), np.ceil(polygons.boxes[:, 2:].max(axis=0))
+    if not np.isfinite(low).all():
+        return np.full(len(np.asarray(points).reshape(-1, 2)), OUTSIDE)
+    width, height = (high - low + 1).astype(int)
+    moved = Polygons(
+        polygons.edges - np.array([*low, *low, 0.0])[:, None],
+        polygons.starts,
+        polygons.boxes - np.concatenate([low, low]),
+    )
+    return looked_up(np.asarray(points, dtype=np.float64).reshape(-1, 2) - low, mask_from(moved, (height, width)))
+
+
+def mask_from(polygons: Polygons, shape: tuple[int, int]) -> Int32Array:
+    """(H, W) the first polygon that each pixel's centre (u, v) lies in, OUTSIDE without one; (0, 0) is the top left."""
+    mask = np.full(shape, OUTSIDE, dtype=np.int32)
+    _draw(polygons.edges, polygons.starts, polygons.boxes, mask)
+    return mask
+
+
+def looked_up(points: ArrayLike, mask: Int32Array) -> Int64Array:
+    """(K,) what the mask (H, W) says at points (K, 2); OUTSIDE beside it."""
+    at = np.ascontiguousarray(np.asarray(points, dtype=np.float64).reshape(-1, 2))
+    found = np.empty(len(at), dtype=np.int64)
+    _look_up(at, mask, found)
+    return found
+
+
+def _located(kernel: Any, points: ArrayLike, polygons: Polygons) -> Int64Array:
+    at = np.ascontiguousarray(np.asarray(points, dtype=np.float64).reshape(-1, 2))
+    found = np.empty(len(at), dtype=np.int64)
+    kernel(at, polygons.edges, polygons.starts, polygons.boxes, found)
+    return found
+
+
+# ------------------------------------------------------------------------------------------------------- the kernels
+
+
+@njit(cache=True, nogil=True)
+def _crossing(points: Any, edges: Any, starts: Any, boxes: Any, found: Any) -> None:
+    """The inner loop has no branch, so that LLVM takes several edges at once."""
+    for k in range(len(points)):
+        x, y = points[k, 0], points[k, 1]
+        found[k] = -1
+        for p in range(len(boxes)):
+            if not (boxes[p, 0] <= x and x <= boxes[p, 2] and boxes[p, 1] <= y and y <= boxes[p, 3]):
+                continue
+            crossed = 0
+            for e in range(starts[p], starts[p + 1]):
+                y0 = edges[1, e]
+                spans = (y0 > y) != (edges[3, e] > y)
+                crossed += spans & (x < edges[0, e] + (y - y0) * edges[4, e])
+            if crossed & 1:
+                found[k] = p
+                break
+
+
+@njit(cache=True, nogil=True)
+def _winding(points: Any, edges: Any, starts: Any, boxes: Any, found: Any) -> None:
+    for k in range(len(points)):
+        x, y = points[k, 0], points[k, 1]
+        found[k] = -1
+        for p in range(len(boxes)):
+            if not (boxes[p, 0] <= x and x <= boxes[p, 2] and boxes[p, 1] <= y and y <= boxes[p, 3]):
+                continue
+            winds = 0
+            for e in range(starts[p], starts[p + 1]):
+                x0, y0, x1, y1 = edges[0, e], edges[1, e], edges[2, e], edges[3, e]
+                left = (x1 - x0) * (y - y0) - (x - x0) * (y1 - y0)
+                winds += (y0 <= y) & (y1 > y) & (left > 0)
+                winds -= (y0 > y) & (y1 <= y) & (left < 0)
+            if winds != 0:
+                found[k] = p
+                break
+
+
+@njit(cache=True, nogil=True)
+def _even_odd(points: Any, edges: Any, starts: Any, boxes: Any, found: Any) -> None:
+    for k in range(len(points)):
+        x, y = points[k, 0], points[k, 1]
+        found[k] = -1
+        for p in range(len(boxes)):
+            if not (boxes[p, 0] <= x and x <= boxes[p, 2] and boxes[p, 1] <= y and y <= boxes[p, 3]):
+                continue
+            is_in = False
+            for e in range(starts[p], starts[p + 1]):
+                x0, y0, x1, y1 = edges[0, e], edges[1, e], edges[2, e], edges[3, e]
+                if (y0 > y) != (y1 > y) and x < (x1 - x0) * (y - y0) / (y1 - y0) + x0:
+                    is_in = not is_in
+            if is_in:
+                found[k] = p
+                break
+
+
+@njit(cache=True, nogil=True)
+def _draw(edges: Any, starts: Any, boxes: Any, mask: Any) -> None:
+    """Row by row: where the row meets the edges, sorted, every second stretch is inside."""
+    height, width = mask.shape
+    for p in range(len(boxes) - 1, -1, -1):
+        first, last = starts[p], starts[p + 1]
+        if first == last:
+            continue
+        places = np.empty(last - first)
+        for v in range(max(0, int(np.ceil(boxes[p, 1]))), min(height - 1, int(np.floor(boxes[p, 3]))) + 1):
+            count = 0
+            for e in range(first, last):
+                y0 = edges[1, e]
+                if (y0 > v) != (edges[3, e] > v):
+                    places[count] = edges[0, e] + (v - y0) * edges[4, e]
+                    count += 1
+            ordered = np.sort(places[:count])
+            for pair in range(0, count - 1, 2):
+                begin = max(0, int(np.ceil(ordered[pair])))
+                for u in range(begin, min(width, int(np.ceil(ordered[pair + 1])))):
+                    mask[v, u] = p
+
+
+@njit(cache=True, nogil=True)
+def _look_up(points: Any, mask: Any, found: Any) -> None:
+    height, width = mask.shape
+    for k in range(len(points)):
+        u, v = np.floor(points[k, 0] + 0.5), np.floor(points[k, 1] + 0.5)
+        found[k] = mask[int(v), int(u)] if u >= 0 and v >= 0 and u < width and v < height else -1
+
+
+POINT_IN_POLYGON: Mapping[str, Callable[[ArrayLike, Polygons], Int64Array]] = {
+    "crossing_number": crossing_number,
+    "winding_number": winding_number,
+    "even_odd": even_odd,
+    "mask": mask_lookup,
+}
