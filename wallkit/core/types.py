@@ -161,6 +161,7 @@ class Points:
         range_max_m: no return can be farther.
         misses_rad: (M,) float32, bearings in frame base of the beams that saw nothing up to range_max_m.
         dropped: why beams were left out, and how many.
+        offsets_s: (K,) float32 when each return was measured, after the stamp; None: all at the stamp, or nobody says.
     """
 
     stamp_ns: int
@@ -171,6 +172,7 @@ class Points:
     range_max_m: float
     misses_rad: Float32Array
     dropped: Mapping[str, int] = field(default_factory=dict)
+    offsets_s: Float32Array | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,6 +184,7 @@ class LabelledScan:
         labels: (K,) int64 class index into `classes`, -1 where no camera saw the point; None without a camera.
         classes: names of the classes the labels point into.
         confidences: (K,) float32 in [0, 1], how sure each label is; None where nobody says: the labels are sure.
+        shares: (K, C) float32 of `BeamLabels`; None where the labels are all that is known.
     """
 
     points: Points
@@ -189,6 +192,7 @@ class LabelledScan:
     labels: Int64Array | None = None
     classes: tuple[str, ...] = ()
     confidences: Float32Array | None = None
+    shares: Float32Array | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,33 +204,55 @@ class BeamLabels:
         labels: (B,) int64 class index into `classes` by recorded beam (see `Points.beams`), -1 for unknown.
         classes: names of the classes.
         confidences: (B,) float32 in [0, 1], or None.
+        shares: (B, C) float32, how much of where the beam may have landed in the picture shows each class; rows of beams
+            with a label sum to 1, those of others are 0. None: the label alone is known.
     """
 
     stamp_ns: int
     labels: Int64Array
     classes: tuple[str, ...]
     confidences: Float32Array | None = None
+    shares: Float32Array | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """What a camera saw at about the moment of a scan, and where odometry says the robot was then.
+
+    Attributes:
+        topic: of the camera's images.
+        moment_ns: when the image was taken, by the LiDAR's clock.
+        odometry: (3,) T_odom_base at that moment.
+    """
+
+    topic: str
+    image: CameraImage
+    moment_ns: int
+    odometry: Float64Array
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One moment for the filter: points, where odometry says the robot was, and the image nearest in time.
+    """One moment for the filter: points, where odometry says the robot was, and the images nearest in time.
 
     Attributes:
         stamp_ns: the scan's stamp.
         points: motion-corrected returns in frame base at stamp_ns.
         odometry: (3,) T_odom_base at stamp_ns.
         odometry_gap_s: longest time without an odometry message since the previous frame.
-        image: nearest image within the tolerance, None without one.
-        labels: classes of the scan's beams, None where the log has none.
+        views: the image of each camera that is nearest in time, where one is within the tolerance.
+        labels: classes of the scan's beams, None where nobody knows them.
+        cloud_m: (P, 3) float32 in frame base, the whole 3-D cloud that `points` are a slice of; None without one, or
+            without a camera.
     """
 
     stamp_ns: int
     points: Points
     odometry: Float64Array
     odometry_gap_s: float = 0.0
-    image: CameraImage | None = None
+    views: tuple[View, ...] = ()
     labels: BeamLabels | None = None
+    cloud_m: Float32Array | None = None
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,15 @@ from wallkit.errors import LogError
 from wallkit.logs.message import Channel
 from wallkit.logs.mount import Mount, find_mount
 from wallkit.logs.reader import Log
-from wallkit.logs.topics import CLOUD_KINDS, Track, frame_of, pick_image, pick_odometry, pick_scan
+from wallkit.logs.topics import CLOUD_KINDS, Track, frame_of, pick_odometry, pick_scan
+
+
+@dataclass(frozen=True, slots=True)
+class CameraTopic:
+    """A camera's images: their topic, and its clock against the LiDAR's: t_camera = t_lidar + offset."""
+
+    topic: str
+    offset_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,20 +26,19 @@ class Wanted:
     """What the user named; None leaves the choice to the log.
 
     Attributes:
-        scan, odometry, image: topics; odometry may be a transform "odom->base_link".
+        scan, odometry: topics; odometry may be a transform "odom->base_link".
+        cameras: whose images are wanted; none: the filter does without.
         base_frame: the frame that odometry moves, where its messages do not name it.
         lidar_pose: T_base_lidar as "X,Y,YAW" or "X,Y,Z,ROLL,PITCH,YAW" [m, rad].
         urdf: the robot's description, to take the LiDAR's place from.
-        use_image: whether a camera is wanted at all.
     """
 
     scan: str | None = None
     odometry: str | None = None
-    image: str | None = None
     base_frame: str | None = None
     lidar_pose: str | None = None
     urdf: Path | None = None
-    use_image: bool = False
+    cameras: tuple[CameraTopic, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +48,7 @@ class Rig:
     Attributes:
         scan: topic of sweeps; is_cloud: whether they are 3-D clouds.
         odometry: topic or transform. base_frame, lidar_frame: T_base_lidar is `mount`.
-        image: topic of the camera; None without one.
+        cameras: whose images belong to the frames.
     """
 
     scan: Channel
@@ -49,7 +56,7 @@ class Rig:
     base_frame: str
     lidar_frame: str
     mount: Mount
-    image: Channel | None = None
+    cameras: tuple[CameraTopic, ...] = ()
 
     @property
     def is_cloud(self) -> bool:
@@ -59,7 +66,7 @@ class Rig:
     @property
     def topics(self) -> set[str]:
         """What to read."""
-        return {self.scan.topic, *self.odometry.topics} | ({self.image.topic} if self.image else set())
+        return {self.scan.topic, *self.odometry.topics, *(camera.topic for camera in self.cameras)}
 
 
 def find_rig(log: Log, wanted: Wanted | None = None) -> Rig:
@@ -71,16 +78,13 @@ def find_rig(log: Log, wanted: Wanted | None = None) -> Rig:
     wanted = wanted or Wanted()
     scan = pick_scan(log, wanted.scan)
     odometry = pick_odometry(log, wanted.odometry)
-    image = pick_image(log, wanted.image) if wanted.use_image or wanted.image else None
-    if wanted.use_image and image is None:
-        raise LogError("no camera image topic", where=log.name, hint="run without the camera, or record its images")
     first = log.first(scan.topic)
     if not first:
         raise LogError(f"the scan topic {scan.topic} holds no readable message", where=log.name)
     lidar_frame = frame_of(first[0].value)
     base_frame = wanted.base_frame or _moving_frame(log, odometry)
     mount = find_mount(log, base_frame, lidar_frame, words=wanted.lidar_pose, urdf=wanted.urdf)
-    return Rig(scan, odometry, base_frame, lidar_frame, mount, image)
+    return Rig(scan, odometry, base_frame, lidar_frame, mount, wanted.cameras)
 
 
 def _moving_frame(log: Log, odometry: Track) -> str:

@@ -65,8 +65,9 @@ def points_from_scan(
     away = bearing[misses] @ mount[:2, :2].T
     misses_rad = np.arctan2(away[:, 1], away[:, 0])
 
-    times = beam_times(scan)
+    times, offsets = beam_times(scan), None
     if times is not None:
+        offsets = ((times[hits] - scan.stamp_ns) * 1e-9).astype(np.float32)
         poses = poses_at(np.append(times, scan.stamp_ns))
         motion = relative(poses[-1], poses[:-1])
         xyz[:, :2] = _turned(motion[hits], xyz[:, :2])
@@ -81,6 +82,7 @@ def points_from_scan(
         range_max_m=float(far_m),
         misses_rad=misses_rad.astype(np.float32),
         dropped=_dropped(scan, near_m, far_m, is_return, is_far),
+        offsets_s=offsets,
     )
 
 

@@ -1,4 +1,4 @@
-"""Messages of a log -> frames for the filter: one for each sweep, with odometry and image at the sweep's header stamp.
+"""Messages of a log -> frames for the filter: one for each sweep, with odometry and images at the sweep's header stamp.
 
 Only header stamps are compared. Record time, which may be days off, says just one thing: how long a sweep has waited for
 messages that were recorded after it. Memory holds the sweeps that wait, the odometry since the oldest of them, and a few
@@ -12,9 +12,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from wallkit.core.config import setting
-from wallkit.core.types import CameraImage, Frame, Odometry, PointCloud, Scan
+from wallkit.core.types import CameraImage, Frame, Odometry, PointCloud, Scan, View
 from wallkit.errors import LogError
-from wallkit.logs.clouds import scan_from_cloud
+from wallkit.logs.clouds import scan_from_cloud, transformed
+from wallkit.logs.eyes import Eyes, Taken
 from wallkit.logs.message import Value
 from wallkit.logs.odometry import OdometryBuffer
 from wallkit.logs.reader import Log
@@ -22,7 +23,6 @@ from wallkit.logs.rig import Rig
 from wallkit.logs.sweep import points_from_scan, sweep_span
 from wallkit.logs.trajectories import poses_of
 
-_IMAGES_HELD = 10
 # a raw image takes megabytes: so many sweeps at most may wait for odometry while each holds one
 _WAITING_WITH_IMAGES = 50
 
@@ -31,7 +31,9 @@ _WAITING_WITH_IMAGES = 50
 class SyncConfig:
     """How sweeps, odometry and images are brought together."""
 
-    image_tolerance_s: float = setting(0.05, "an image farther than this from the sweep's stamp is not used", low=0)
+    image_tolerance_s: float = setting(
+        0.06, "an image farther than this from the sweep's middle is not used; half the time between images", low=0
+    )
     odometry_gap_max_s: float = setting(1.0, "longest time without odometry that is interpolated over", low=0)
     lookahead_s: float = setting(10.0, "how much later than a sweep its odometry and image may be recorded", low=0)
     range_min_m: float = setting(0.0, "nearer returns are not used (the driver's own limit counts too)", low=0)
@@ -51,13 +53,14 @@ class SyncReport:
         at_the_ends: of the dropped, those where odometry began a moment later or ended a moment earlier than the sweeps,
             as it does in every recording.
         beams_dropped: by reason, summed over all frames.
-        frames_without_image: when a camera is used.
+        images: used, of all cameras. frames_without_image: when cameras are used, those that no image belongs to.
         odometry_gap_max_s: longest time without odometry between two frames.
     """
 
     scans: int = 0
     frames: int = 0
     at_the_ends: int = 0
+    images: int = 0
     frames_without_image: int = 0
     odometry_gap_max_s: float = 0.0
     scans_dropped: Counter[str] = field(default_factory=Counter)
@@ -113,7 +116,13 @@ class _Waiting:
     scan: Scan
     log_ns: int
     span_ns: tuple[int, int]
-    image: CameraImage | None = None
+    cloud: PointCloud | None = None
+    images: dict[str, Taken] = field(default_factory=dict)
+
+    @property
+    def middle_ns(self) -> int:
+        """Of the time that the sweep took."""
+        return (self.span_ns[0] + self.span_ns[1]) // 2
 
 
 class _Synchroniser:
@@ -126,25 +135,27 @@ class _Synchroniser:
         self._odometry = OdometryBuffer()
         report.odometry_dropped = self._odometry.dropped
         self.waiting: deque[_Waiting] = deque()
-        self._images: deque[CameraImage] = deque(maxlen=_IMAGES_HELD)
+        self._eyes = Eyes(rig.cameras, config.image_tolerance_s)
         self._last_scan_ns: int | None = None
         self._scan_span_ns: tuple[int, int] | None = None
         self._lookahead_ns = round(config.lookahead_s * 1e9)
         self._gap_max_ns = round(config.odometry_gap_max_s * 1e9)
-        self._image_tolerance_ns = round(config.image_tolerance_s * 1e9)
 
     def take(self, topic: str, value: Value, log_ns: int) -> None:
         """Sort a message into the buffers."""
         if isinstance(value, Odometry):
             self._odometry.add(value.stamp_ns, value.pose)
         elif topic == self._rig.scan.topic:
-            if isinstance(value, PointCloud):
+            cloud = value if isinstance(value, PointCloud) else None
+            if cloud is not None:
                 limits = {"low_m": self._config.slice_low_m, "high_m": self._config.slice_high_m}
-                value = scan_from_cloud(value, self._rig.mount.matrix, **limits)
+                value = scan_from_cloud(cloud, self._rig.mount.matrix, **limits)
             if isinstance(value, Scan):
-                self._take_scan(value, log_ns)
+                self._take_scan(value, log_ns, cloud if self._rig.cameras else None)
         elif isinstance(value, CameraImage):
-            self._take_image(value)
+            taken = self._eyes.take(topic, value)
+            for waiting in self.waiting:
+                self._eyes.offer(waiting.images, waiting.middle_ns, taken)
         else:
             for stamp_ns, pose in poses_of(value, self._rig.odometry):
                 self._odometry.add(stamp_ns, pose)
@@ -156,7 +167,7 @@ class _Synchroniser:
         """Frames that can be made. `now_ns` is the record time reached, None at the end of the log."""
         while self.waiting:
             head = self.waiting[0]
-            is_full = self._rig.image is not None and len(self.waiting) > _WAITING_WITH_IMAGES
+            is_full = bool(self._rig.cameras) and len(self.waiting) > _WAITING_WITH_IMAGES
             is_late = now_ns is None or now_ns - head.log_ns > self._lookahead_ns or is_full
             if not is_late and not self._is_complete(head):
                 return
@@ -176,7 +187,7 @@ class _Synchroniser:
         reasons = "; ".join(self.report.lines())
         return f"none of the {self.report.scans} sweeps has odometry: {reasons} (header stamps: {stamps})"
 
-    def _take_scan(self, scan: Scan, log_ns: int) -> None:
+    def _take_scan(self, scan: Scan, log_ns: int, cloud: PointCloud | None) -> None:
         if (self._start_ns is not None and scan.stamp_ns < self._start_ns) or (
             self._end_ns is not None and scan.stamp_ns >= self._end_ns
         ):
@@ -191,29 +202,24 @@ class _Synchroniser:
             self._dropped("repeated stamp" if scan.stamp_ns == last_ns else "stamp goes back")
         else:
             self._last_scan_ns = scan.stamp_ns
-            waiting = _Waiting(scan, log_ns, sweep_span(scan))
-            for image in self._images:
-                self._offer(waiting, image)
+            waiting = _Waiting(scan, log_ns, sweep_span(scan), cloud)
+            for image in self._eyes.held:
+                self._eyes.offer(waiting.images, waiting.middle_ns, image)
             self.waiting.append(waiting)
-
-    def _take_image(self, image: CameraImage) -> None:
-        self._images.append(image)
-        for waiting in self.waiting:
-            self._offer(waiting, image)
-
-    def _offer(self, waiting: _Waiting, image: CameraImage) -> None:
-        distance_ns = abs(image.stamp_ns - waiting.scan.stamp_ns)
-        best = waiting.image
-        is_nearer = best is None or distance_ns < abs(best.stamp_ns - waiting.scan.stamp_ns)
-        if distance_ns <= self._image_tolerance_ns and is_nearer:
-            waiting.image = image
 
     def _is_complete(self, waiting: _Waiting) -> bool:
         last_ns = self._odometry.last_ns
-        has_odometry = last_ns is not None and last_ns >= waiting.span_ns[1]
-        newest = self._images[-1].stamp_ns if self._images else None
-        has_image = self._rig.image is None or (newest is not None and newest >= waiting.scan.stamp_ns)
-        return has_odometry and has_image
+        needed_ns = max([waiting.span_ns[1], *(image.moment_ns for image in waiting.images.values())])
+        return last_ns is not None and last_ns >= needed_ns and self._eyes.have_seen(waiting.middle_ns)
+
+    def _views(self, waiting: _Waiting) -> tuple[View, ...]:
+        """The sweep's images, with the robot's pose at each; without those whose pose odometry does not tell."""
+        odometry, found = self._odometry, []
+        for topic, taken in sorted(waiting.images.items()):
+            is_held = odometry.last_ns is not None and odometry.held_from_ns <= taken.moment_ns <= odometry.last_ns
+            if is_held:
+                found.append(View(topic, taken.image, taken.moment_ns, odometry.pose_at(taken.moment_ns)))
+        return tuple(found)
 
     def _frame(self, waiting: _Waiting) -> Frame | None:
         scan = waiting.scan
@@ -225,14 +231,16 @@ class _Synchroniser:
         if not len(points.xyz_m):
             self._dropped("no return between the range limits")
             return None
-        pose = self._odometry.pose_at(scan.stamp_ns)
+        pose, views = self._odometry.pose_at(scan.stamp_ns), self._views(waiting)
         gap_s = self._odometry.take_gap(scan.stamp_ns) * 1e-9
         self.report.frames += 1
         self.report.beams_dropped.update(points.dropped)
         self.report.odometry_gap_max_s = max(self.report.odometry_gap_max_s, gap_s)
-        if self._rig.image is not None and waiting.image is None:
+        self.report.images += len(views)
+        if self._rig.cameras and not views:
             self.report.frames_without_image += 1
-        return Frame(scan.stamp_ns, points, pose, gap_s, waiting.image)
+        cloud_m = None if waiting.cloud is None or not views else transformed(waiting.cloud.points_m, self._rig.mount.matrix)
+        return Frame(scan.stamp_ns, points, pose, gap_s, views, cloud_m=cloud_m)
 
     def _why_no_odometry(self, start_ns: int, end_ns: int) -> str:
         """Why the robot's pose is not known throughout a sweep; empty when it is."""

@@ -46,6 +46,8 @@ TRANSFORM_KINDS = (
     "foxglove.FrameTransform",
     "foxglove.FrameTransforms",
 )
+# what a simulator knows and no robot does
+ORACLE = "/oracle/"
 _TRUTH_WORDS = {"truth", "groundtruth", "gt"}
 _PEEK = 20
 
@@ -124,13 +126,13 @@ def pick_initial_pose(log: Log, name: str | None = None) -> Channel | None:
 
 
 def pick_image(log: Log, name: str | None = None) -> Channel | None:
-    """The topic of camera images; depth images are none. None without one.
+    """The topic of camera images; depth images and a simulator's labels are none. None without one.
 
     Raises:
         LogError: several, or not the one named.
     """
     candidates = log.channels_of(*IMAGE_KINDS)
-    likely = candidates if name else tuple(c for c in candidates if "depth" not in c.topic.lower())
+    likely = candidates if name else tuple(c for c in candidates if is_picture_name(c.topic))
     return _the_one(log, "camera image", "--image", likely, name) if likely or name else None
 
 
@@ -138,6 +140,11 @@ def is_truth_name(topic: str) -> bool:
     """Whether a topic's name says that it is ground truth."""
     words = [w for w in re.split(r"[^a-z0-9]+", topic.lower()) if w]
     return bool(_TRUTH_WORDS & set(words))
+
+
+def is_picture_name(topic: str) -> bool:
+    """Whether a topic of images holds what a camera saw, by its name."""
+    return "depth" not in topic.lower() and not topic.startswith(ORACLE)
 
 
 def transform_topics(log: Log) -> tuple[str, ...]:
