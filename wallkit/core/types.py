@@ -223,12 +223,15 @@ class View:
         topic: of the camera's images.
         moment_ns: when the image was taken, by the LiDAR's clock.
         odometry: (3,) T_odom_base at that moment.
+        speed_m_s, turn_rad_s: of the robot just before it.
     """
 
     topic: str
     image: CameraImage
     moment_ns: int
     odometry: Float64Array
+    speed_m_s: float = 0.0
+    turn_rad_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

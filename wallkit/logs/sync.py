@@ -11,7 +11,10 @@ from collections import Counter, deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from wallkit.core.config import setting
+from wallkit.core.geometry import relative
 from wallkit.core.types import CameraImage, Frame, Odometry, PointCloud, Scan, View
 from wallkit.errors import LogError
 from wallkit.logs.clouds import scan_from_cloud, transformed
@@ -25,6 +28,7 @@ from wallkit.logs.trajectories import poses_of
 
 # a raw image takes megabytes: so many sweeps at most may wait for odometry while each holds one
 _WAITING_WITH_IMAGES = 50
+_SPEED_OVER_NS = 100_000_000
 
 
 @dataclass(frozen=True)
@@ -218,7 +222,11 @@ class _Synchroniser:
         for topic, taken in sorted(waiting.images.items()):
             is_held = odometry.last_ns is not None and odometry.held_from_ns <= taken.moment_ns <= odometry.last_ns
             if is_held:
-                found.append(View(topic, taken.image, taken.moment_ns, odometry.pose_at(taken.moment_ns)))
+                pose = odometry.pose_at(taken.moment_ns)
+                before_ns = max(odometry.held_from_ns, taken.moment_ns - _SPEED_OVER_NS)
+                driven = relative(odometry.pose_at(before_ns), pose) / max(1e-9 * (taken.moment_ns - before_ns), 1e-3)
+                speed, turn = float(np.hypot(driven[0], driven[1])), abs(float(driven[2]))
+                found.append(View(topic, taken.image, taken.moment_ns, pose, speed, turn))
         return tuple(found)
 
     def _frame(self, waiting: _Waiting) -> Frame | None:

@@ -20,4 +20,5 @@ def labelled_scan(frame: Frame) -> LabelledScan:
         return LabelledScan(points, weights)
     labels = np.where(known, given.labels[beams], -1)
     confidences = None if given.confidences is None else given.confidences[beams].astype(np.float32)
-    return LabelledScan(points, weights, labels, given.classes, confidences)
+    shares = None if given.shares is None else np.where(known[:, None], given.shares[beams], np.float32(0.0))
+    return LabelledScan(points, weights, labels, given.classes, confidences, shares)
