@@ -16,6 +16,10 @@ from wallkit.core.config import section, setting
 from wallkit.core.raycast import SHORT, classify_rays
 from wallkit.core.types import Estimate, FieldSet, Float32Array, Health, LabelledScan
 from wallkit.errors import ConfigError, closest
+from wallkit.points.kept import KeptSettings
+from wallkit.points.line_fit import LineFit
+from wallkit.points.look import LookSettings
+from wallkit.points.mask_filters import RejectDynamic, SoftMask, WallMask
 
 
 class PointFilter(Protocol):
@@ -67,21 +71,40 @@ class _NoveltyOnMap:
 
 
 FILTERS: dict[str, type[PointFilter]] = {
+    "wall_mask": WallMask,
+    "soft_mask": SoftMask,
+    "reject_dynamic": RejectDynamic,
+    "line_fit": LineFit,
     "novelty": Novelty,
 }
+# those that look at what cameras say
+WITH_CAMERA = ("wall_mask", "soft_mask", "reject_dynamic")
 
 
 @dataclass(frozen=True)
 class PointsSettings:
     """The [points] table of wallkit.toml."""
 
-    filters: tuple[str, ...] = setting((), "point filters applied in turn; their weights multiply")
+    filters: tuple[str, ...] = setting(
+        (), "point filters applied in turn, as --filter; their weights multiply: " + ", ".join(FILTERS)
+    )
+    wall_mask: WallMask = section(WallMask, "only returns that land on walls in a camera's image")
+    soft_mask: SoftMask = section(SoftMask, "how likely a return is from the map, by what it lands on in an image")
+    reject_dynamic: RejectDynamic = section(RejectDynamic, "no returns that land on people and movable things")
+    line_fit: LineFit = section(LineFit, "only returns on long straight lines")
     novelty: Novelty = section(Novelty, "returns in front of the map")
+    look: LookSettings = section(LookSettings, "where in an image a return may have landed")
+    kept: KeptSettings = section(KeptSettings, "when what the filters leave is too little")
 
     def __post_init__(self) -> None:
         for name in self.filters:
             if name not in FILTERS:
                 raise ConfigError(f"no point filter is called '{name}'", hint=closest(name, FILTERS))
+
+    @property
+    def needs_camera(self) -> bool:
+        """Whether one of the chosen filters looks at images."""
+        return any(name in WITH_CAMERA for name in self.filters)
 
     def on(self, fields: FieldSet) -> tuple[BoundFilter, ...]:
         """The chosen filters on one map."""

@@ -1,0 +1,66 @@
+"""Weighted returns -> whether enough is left to hold on to: how many, and whether they hold both directions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from wallkit.core.config import setting
+from wallkit.core.types import LabelledScan
+
+
+@dataclass(frozen=True)
+class KeptSettings:
+    """When the returns that filters leave are too few or look one way only."""
+
+    weight: float = setting(0.5, "a return of at least this weight counts as kept", low=0, high=1)
+    least: int = setting(40, "fewer kept returns are too few", low=1)
+    least_share_across: float = setting(
+        0.03, "one-sided: a smaller share of the surfaces' directions is across the main one", low=0, high=0.5
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """What filters left of one scan.
+
+    Attributes:
+        returns: there were. kept: of weight enough.
+        share_across: how much of the kept surfaces' normals is across their main direction, in [0, 0.5]: 0 along one
+            straight wall, 0.5 in a corner.
+    """
+
+    returns: int
+    kept: int
+    share_across: float
+    is_few: bool
+    is_one_sided: bool
+
+
+def kept_of(scan: LabelledScan, settings: KeptSettings) -> Kept:
+    """What is left of a scan, and whether it is too little."""
+    kept = np.flatnonzero(scan.weights >= settings.weight)
+    order = kept[np.argsort(scan.points.beams[kept], kind="stable")]
+    across = float(_share_across(scan.points.xyz_m[order]))
+    is_few = len(kept) < settings.least
+    return Kept(len(scan.weights), len(kept), across, is_few, not is_few and across < settings.least_share_across)
+
+
+@njit(cache=True, nogil=True)
+def _share_across(xyz: Any) -> Any:
+    """Smaller eigenvalue over the sum of both, of the scatter of normals between returns five apart on one surface."""
+    xx, xy, yy = 0.0, 0.0, 0.0
+    for k in range(5, len(xyz)):
+        dx, dy = xyz[k, 0] - xyz[k - 5, 0], xyz[k, 1] - xyz[k - 5, 1]
+        square = dx * dx + dy * dy
+        if 0 < square < 0.25:
+            xx += dx * dx / square
+            xy += dx * dy / square
+            yy += dy * dy / square
+    total = xx + yy
+    if total == 0:
+        return 0.0
+    return 0.5 - 0.5 * np.sqrt((xx - yy) ** 2 + 4 * xy * xy) / total

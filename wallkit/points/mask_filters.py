@@ -1,0 +1,134 @@
+"""What cameras say about the returns of a scan -> weights: the paper's wall mask, its opposite, and a soft one.
+
+They look at `LabelledScan.shares`: how much of where a return may have landed in the picture shows which class. A return
+that no camera sees, or of a picture that says nothing there, keeps `unseen_weight`: what other filters say of it counts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from wallkit.core.config import setting
+from wallkit.core.types import BoolArray, Estimate, FieldSet, Float32Array, LabelledScan
+
+if TYPE_CHECKING:
+    from wallkit.points.filters import BoundFilter
+
+# shares are sums of float32
+_WHOLE = np.float32(1 - 1e-4)
+
+
+@dataclass(frozen=True)
+class WallMask:
+    """Only returns on a wall count (Shavarskyi & Kryvenchuk 2025): the whole circle of a pixel's error must show one.
+
+    A mask is eroded by the error that way, point by point, as the error grows with nearness.
+    """
+
+    keep: tuple[str, ...] = setting(
+        ("wall", "partition"), "classes that count as wall; door, glass, toilet, urinal, sink, other may join"
+    )
+    unseen_weight: float = setting(1.0, "weight of a return that no camera sees", low=0, high=1)
+
+    def on(self, fields: FieldSet) -> BoundFilter:
+        """See PointFilter."""
+        return self
+
+    def weigh(self, scan: LabelledScan, estimate: Estimate) -> Float32Array:
+        """See BoundFilter."""
+        known = _known(scan)
+        if known is None:
+            return np.full(len(scan.weights), self.unseen_weight, dtype=np.float32)
+        seen, shares = known
+        kept = shares @ _chosen(scan.classes, self.keep) >= _WHOLE
+        return np.where(seen, kept, np.float32(self.unseen_weight)).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class RejectDynamic:
+    """Returns on people, and on what need not stand where the map was made, do not count; all others do.
+
+    For a model that knows people and chairs but no walls, as those trained on COCO. A return goes if any of the circle of
+    its pixel's error shows one: the mask is dilated by it.
+    """
+
+    reject: tuple[str, ...] = setting(("person", "movable"), "classes that are rejected")
+    unseen_weight: float = setting(1.0, "weight of a return that no camera sees", low=0, high=1)
+
+    def on(self, fields: FieldSet) -> BoundFilter:
+        """See PointFilter."""
+        return self
+
+    def weigh(self, scan: LabelledScan, estimate: Estimate) -> Float32Array:
+        """See BoundFilter."""
+        known = _known(scan)
+        if known is None:
+            return np.full(len(scan.weights), self.unseen_weight, dtype=np.float32)
+        seen, shares = known
+        kept = shares @ _chosen(scan.classes, self.reject) <= 1 - _WHOLE
+        return np.where(seen, kept, np.float32(self.unseen_weight)).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class SoftMask:
+    """How likely a return comes from the map, by the class it lands on and how sure that is: no verdict, a prior.
+
+    w = c sum_j s_j p_j + (1 - c) p_background: s_j the share of class j in the circle of the pixel's error, c the model's
+    confidence, p_j one of the settings below. The class-conditional sensor model takes w as its prior (times known_prior);
+    the likelihood field as an exponent.
+    """
+
+    wall: float = setting(1.0, "how likely a return that lands on a wall comes from the map", low=0, high=1)
+    partition: float = setting(1.0, "on a partition", low=0, high=1)
+    door: float = setting(0.8, "on a door, which may stand otherwise", low=0, high=1)
+    glass: float = setting(0.3, "on glass, which most beams pass", low=0, high=1)
+    mirror: float = setting(0.1, "on a mirror, which shows another place", low=0, high=1)
+    toilet: float = setting(1.0, "on a toilet", low=0, high=1)
+    urinal: float = setting(1.0, "on a urinal", low=0, high=1)
+    sink: float = setting(1.0, "on a wash basin", low=0, high=1)
+    floor: float = setting(0.5, "on the floor: the pixel missed what the beam met", low=0, high=1)
+    ceiling: float = setting(0.5, "on the ceiling", low=0, high=1)
+    person: float = setting(0.0, "on a person", low=0, high=1)
+    movable: float = setting(0.2, "on what need not stand where the map was made", low=0, high=1)
+    other: float = setting(0.6, "on something else that has a name", low=0, high=1)
+    background: float = setting(0.5, "on what has none, and as far as the model is not sure", low=0, high=1)
+    unseen_weight: float = setting(1.0, "weight of a return that no camera sees", low=0, high=1)
+
+    def on(self, fields: FieldSet) -> BoundFilter:
+        """See PointFilter."""
+        return self
+
+    def weigh(self, scan: LabelledScan, estimate: Estimate) -> Float32Array:
+        """See BoundFilter."""
+        known = _known(scan)
+        if known is None:
+            return np.full(len(scan.weights), self.unseen_weight, dtype=np.float32)
+        seen, shares = known
+        priors = np.array([getattr(self, name, self.other) for name in scan.classes], dtype=np.float32)
+        sure = np.float32(1.0) if scan.confidences is None else scan.confidences
+        doubt = np.float32(self.background)
+        weights = sure * (shares @ priors) + (1 - sure) * doubt
+        return np.where(seen, weights, np.float32(self.unseen_weight)).astype(np.float32)
+
+    @staticmethod
+    def classes() -> tuple[str, ...]:
+        """That have a prior of their own."""
+        return tuple(f.name for f in fields(SoftMask) if f.name != "unseen_weight")
+
+
+def _known(scan: LabelledScan) -> tuple[BoolArray, Float32Array] | None:
+    """(K,) which returns carry a label, and (K, C) their shares; None where no camera looked at all."""
+    if scan.labels is None or not scan.classes:
+        return None
+    seen = scan.labels >= 0
+    if scan.shares is not None:
+        return seen, scan.shares
+    return seen, np.eye(len(scan.classes), dtype=np.float32)[scan.labels] * seen[:, None]
+
+
+def _chosen(classes: tuple[str, ...], names: tuple[str, ...]) -> Float32Array:
+    """(C,) 1 for the classes that are among the names."""
+    return np.array([name in names for name in classes], dtype=np.float32)
