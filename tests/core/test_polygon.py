@@ -52,7 +52,9 @@ def oracle(points, shapes):
 
 @pytest.mark.parametrize("name", POINT_IN_POLYGON)
 def test_a_square_with_a_hole(name):
-    found = POINT_IN_POLYGON[name]([[12, 20], [20, 20], [5, 20], [28, 28], [np.nan, 20], [40, 20]], packed([[SQUARE, HOLE]]))
+    found = POINT_IN_POLYGON[name](
+        [[12, 20], [20, 20], [5, 20], [28, 28], [np.nan, 20], [40, 20]], packed([[SQUARE, HOLE]])
+    )
     assert found.tolist() == [0, OUTSIDE, OUTSIDE, 0, OUTSIDE, OUTSIDE]
 
 
@@ -110,4 +112,10 @@ def test_a_ray_through_corners_counts_them_once(name):
     step = [(0.0, 0.0), (10.0, 0.0), (10.0, 5.0), (20.0, 5.0), (20.0, 10.0), (0.0, 10.0)]
     of = POINT_IN_POLYGON[name]
     assert of([[5, 0], [-5, 0], [25, 0]], packed([[diamond]])).tolist() == [0, OUTSIDE, OUTSIDE]
-    assert of([[5, 5], [-5, 5], [25, 5], [15, 7], [15, 3]], packed([[step]])).tolist() == [0, OUTSIDE, OUTSIDE, 0, OUTSIDE]
+    assert of([[5, 5], [-5, 5], [25, 5], [15, 7], [15, 3]], packed([[step]])).tolist() == [
+        0,
+        OUTSIDE,
+        OUTSIDE,
+        0,
+        OUTSIDE,
+    ]

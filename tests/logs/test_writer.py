@@ -179,7 +179,7 @@ def test_any_core_type_can_be_written_and_topics_may_hold_two_types(tmp_path):
 
 def test_the_layout_shows_every_topic_that_is_written(tmp_path, result):
     path = tmp_path / "layout.json"
-    write_layout(path, image_topic="/camera")
+    write_layout(path, cameras={"/camera": "/wallkit/camera/front/annotations"})
     layout = json.loads(path.read_text())
 
     def panels(node):

@@ -22,9 +22,7 @@ def labelled(shares, confidences=None):
     """A scan of as many returns as there are rows; a row of zeros is a return that no camera sees."""
     shares = np.array(shares, dtype=np.float32)
     scan = scan_at(FLAT, POSE)
-    points = replace(
-        scan.points, **{f: getattr(scan.points, f)[: len(shares)] for f in ("xyz_m", "ranges_m", "beams")}
-    )
+    points = replace(scan.points, **{f: getattr(scan.points, f)[: len(shares)] for f in ("xyz_m", "ranges_m", "beams")})
     labels = np.where(shares.sum(axis=1) > 0, shares.argmax(axis=1), -1)
     sure = None if confidences is None else np.array(confidences, dtype=np.float32)
     return replace(scan, points=points, weights=scan.weights[: len(shares)], labels=labels, classes=CLASSES,
@@ -53,12 +51,12 @@ def test_the_soft_mask_is_the_mean_prior():
     soft = SoftMask(wall=1.0, door=0.8, person=0.0, background=0.5)
     np.testing.assert_allclose(weights(soft, labelled(ROWS)), [1, 0.94, 0.9, 0, 0.5, 1], atol=1e-6)
     # a model that is sure by half leaves the other half to what has no name
-    np.testing.assert_allclose(
-        weights(soft, labelled(ROWS, [0.5] * 6)), [0.75, 0.72, 0.7, 0.25, 0.5, 1], atol=1e-6
-    )
+    np.testing.assert_allclose(weights(soft, labelled(ROWS, [0.5] * 6)), [0.75, 0.72, 0.7, 0.25, 0.5, 1], atol=1e-6)
 
 
-@pytest.mark.parametrize("one", [WallMask(unseen_weight=0.5), RejectDynamic(unseen_weight=0.5), SoftMask(unseen_weight=0.5)])
+@pytest.mark.parametrize(
+    "one", [WallMask(unseen_weight=0.5), RejectDynamic(unseen_weight=0.5), SoftMask(unseen_weight=0.5)]
+)
 def test_without_a_camera_all_is_unseen(one):
     scan = scan_at(FLAT, POSE)
     assert set(weights(one, scan)) == {0.5}

@@ -11,6 +11,7 @@ from wallkit.cli import common
 
 if TYPE_CHECKING:
     from wallkit.logs.rig import Wanted
+    from wallkit.pipelines.cameras import CameraRequest
     from wallkit.pipelines.evaluate import Evaluation
     from wallkit.pipelines.localize import Prepared, Run
     from wallkit.pipelines.run_folder import RunRecord
@@ -24,6 +25,27 @@ topic_options = common.options(
     click.option("--lidar-pose", metavar="X,Y,YAW", help="LiDAR on the robot [m, rad]; also X,Y,Z,ROLL,PITCH,YAW."),
     click.option("--urdf", type=click.Path(path_type=Path), metavar="FILE", help="Robot description to take it from."),
 )
+
+
+camera_options = common.options(
+    click.option(
+        "--filter",
+        "filters",
+        multiple=True,
+        metavar="NAME",
+        help="wall_mask, soft_mask, reject_dynamic (cameras); line_fit, novelty (LiDAR alone); several multiply.",
+    ),
+    click.option("--model", metavar="FILE.onnx|oracle", help="What segments images; oracle: a simulated log's masks."),
+    click.option(
+        "--calib", "calibrations", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
+        help="Camera and LiDAR; once for each camera.",
+    ),
+    click.option("--camera", "cameras", multiple=True, metavar="NAME|TOPIC", help="Whose images, if not found by frame."),
+    click.option("--allow-unverified", is_flag=True, help="Use a calibration that `calib verify` has refused."),
+    click.option("--fallback", type=click.Choice(["lidar"]), help="Go on without cameras that cannot be used."),
+    click.option("--overlay", "overlays", type=click.IntRange(min=0), default=0, metavar="N",
+                 help="Draw N images with masks and returns."),
+)  # fmt: skip
 
 
 @click.command()
@@ -40,6 +62,7 @@ topic_options = common.options(
 )
 @click.option("--truth", metavar="TOPIC|FILE.tum", help='True poses, if not found by name; also "map->base_link".')
 @topic_options
+@camera_options
 @click.option("--start", type=float, metavar="S", help="Begin so many seconds after the first scan.")
 @click.option("--end", type=float, metavar="S", help="End so many seconds after the first scan.")
 @click.option("--particles", type=int, metavar="N", help="Particles (localize.particles).")
@@ -71,6 +94,8 @@ def localize(ctx: click.Context, /, logs: tuple[Path, ...], **flags: Any) -> Non
       wallkit localize log.mcap --map floor.yaml
       wallkit localize log.mcap --map floor.yaml --init 1.5,2,0 --seeds 10
       wallkit localize bag/ --map floor.yaml --lidar-pose 0.2,0,0 --set localize.particles=5000
+      wallkit localize log.mcap --map floor.yaml --filter line_fit
+      wallkit localize log.mcap --map floor.yaml --filter wall_mask --calib front.toml --model walls.onnx --overlay 4
       wallkit localize log.mcap --map floor.yaml --out - --format tum > poses.tum
     """
     from wallkit.evaluate.resources import mark_now
@@ -79,7 +104,12 @@ def localize(ctx: click.Context, /, logs: tuple[Path, ...], **flags: Any) -> Non
 
     mark = mark_now()
     loaded = load_config(
-        flags["config_path"], flags["words"], {"localize.particles": (flags["particles"], "--particles")}
+        flags["config_path"],
+        flags["words"],
+        {
+            "localize.particles": (flags["particles"], "--particles"),
+            "points.filters": (filters_from_words(flags["filters"]), "--filter"),
+        },
     )
     request = request_from_flags(logs, flags)
     streaming = flags["out"] is not None and str(flags["out"]) == "-"
@@ -89,10 +119,9 @@ def localize(ctx: click.Context, /, logs: tuple[Path, ...], **flags: Any) -> Non
         from wallkit.pipelines.outputs import check_out
 
         check_out(out, overwrite=flags["overwrite"])
-    prepared = prepare(request, loaded.config)
-    for finding in prepared.map.findings:
-        if finding.severity != "info":
-            common.warn(str(finding), quiet=flags["quiet"])
+    prepared = prepare(request, loaded.config, seeds=flags["seeds"])
+    for warning in warnings_of(prepared):
+        common.warn(warning, quiet=flags["quiet"])
     if flags["dry_run"]:
         _say_plan(prepared, out)
     elif streaming:
@@ -114,7 +143,35 @@ def request_from_flags(logs: tuple[Path, ...], flags: dict[str, Any]) -> Any:
         start_s=flags["start"],
         end_s=flags["end"],
         wanted=wanted_from_flags(flags),
+        cameras=cameras_from_flags(flags),
     )
+
+
+def cameras_from_flags(flags: dict[str, Any]) -> CameraRequest:
+    """What the user says about cameras."""
+    from wallkit.pipelines.cameras import CameraRequest
+
+    return CameraRequest(
+        calibrations=flags["calibrations"],
+        cameras=flags["cameras"],
+        model=flags["model"] or "",
+        allow_unverified=flags["allow_unverified"],
+        may_fall_back=flags["fallback"] is not None,
+        overlays=flags["overlays"],
+    )
+
+
+def filters_from_words(words: tuple[str, ...]) -> tuple[str, ...] | None:
+    """Names of filters, also with commas between; none: an empty list. None when nothing was said."""
+    names = tuple(name for word in words for name in word.split(",") if name)
+    return None if not words else () if names == ("none",) else names
+
+
+def warnings_of(prepared: Prepared) -> list[str]:
+    """What is odd about the map and the cameras."""
+    found = [str(finding) for finding in prepared.map.findings if finding.severity != "info"]
+    found += [note for camera in (prepared.sight.cameras if prepared.sight else ()) for note in camera.notes]
+    return found + ([f"the LiDAR alone is used: {prepared.fallen_back}"] if prepared.fallen_back else [])
 
 
 def wanted_from_flags(flags: dict[str, Any]) -> Wanted:
@@ -194,6 +251,8 @@ def five_lines(run: Run, record: RunRecord, evaluation: Evaluation, out: Path) -
     lines.append(
         f"fast     {wall:.1f} s for {span:.0f} s of log; {updates:.2f} ms per update, {numbers['updates'].value:.0f} updates"
     )
+    if run.filtering is not None:
+        lines.append(f"filter   {'; '.join(run.filtering.lines())}")
     lines.append(f"dropped  {drop_line(run)}")
     return [*lines, "", f"report   {out / 'report.html'}"]
 
@@ -246,6 +305,10 @@ def _say_plan(prepared: Prepared, out: Path) -> None:
     click.echo(f"map      {p.map.grid.source}: {width} x {height} cells of {p.map.fields.resolution_m:g} m")
     click.echo(f"start    {start}; truth: {'yes' if p.truth is not None else 'no'}")
     click.echo(f"filter   {p.config.localize.tracker}, {p.config.localize.particles} particles")
+    if p.config.points.filters:
+        click.echo(f"returns  {', '.join(p.config.points.filters)}")
+    for camera in p.sight.cameras if p.sight else ():
+        click.echo(f"camera   {camera.name}: {camera.topic}, {camera.source}, model {p.sight.model if p.sight else ''}")
     click.echo(f"writes   {out}/  (dry run: nothing is written)")
 
 

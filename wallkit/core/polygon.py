@@ -1,6 +1,6 @@
 """Points and polygons with holes -> which polygon each point lies in, by crossing number, winding number, even-odd or mask.
 
-All four agree but for points on an edge (Hormann & Agathos 2001), where rounding decides; the mask is as coarse as its pixels.
+All agree but for points on an edge (Hormann & Agathos 2001), where rounding decides; the mask is as coarse as its pixels.
 They agree as long as the rings of a polygon do not cross each other or themselves.
 """
 

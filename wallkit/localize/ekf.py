@@ -79,6 +79,10 @@ class ScanMatchingEkf:
             gap_s=gap,
         )
 
+    def wants(self, belief: GaussianBelief, scan: LabelledScan) -> bool:
+        """Every scan is used."""
+        return True
+
     def update(
         self, rng: np.random.Generator, belief: GaussianBelief, scan: LabelledScan
     ) -> tuple[GaussianBelief, StepInfo]:

@@ -72,6 +72,10 @@ class MonteCarloLocalizer:
             return belief
         return self._moved(rng, belief)
 
+    def wants(self, belief: Belief, scan: LabelledScan) -> bool:
+        """Whether `update` will use the scan: enough motion, or a scan that the belief does not explain."""
+        return belief.is_due or self._contradicts(belief, scan)
+
     def update(self, rng: np.random.Generator, belief: Belief, scan: LabelledScan) -> tuple[Belief, StepInfo]:
         """The belief after a scan, and what the update did; without enough motion the belief as it was."""
         s, is_forced = self.settings, not belief.is_due

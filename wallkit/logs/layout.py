@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 _PLOT_COLOURS = ("#4e98e2", "#f5774d", "#f7df71", "#5cd6a9")
@@ -12,16 +14,16 @@ _ERROR, _HEALTH, _RATIOS = "Plot!error", "Plot!health", "Plot!ratios"
 _CAMERA, _DIAGNOSTICS = "Image!camera", "DiagnosticSummary!health"
 
 
-def write_layout(path: Path, *, image_topic: str = "") -> None:
+def write_layout(path: Path, *, cameras: Mapping[str, str] = MappingProxyType({})) -> None:
     """Write the layout; Foxglove opens it by "Import from file"."""
-    path.write_text(json.dumps(foxglove_layout(image_topic=image_topic), indent=1) + "\n", encoding="utf-8")
+    path.write_text(json.dumps(foxglove_layout(cameras=cameras), indent=1) + "\n", encoding="utf-8")
 
 
-def foxglove_layout(*, image_topic: str = "") -> dict[str, Any]:
+def foxglove_layout(*, cameras: Mapping[str, str] = MappingProxyType({})) -> dict[str, Any]:
     """The layout as Foxglove's JSON.
 
     Args:
-        image_topic: the camera's topic, where the result is played beside its log.
+        cameras: topic of a camera's images, where the result is played beside its log -> topic of its annotations.
     """
     configs: dict[str, Any] = {
         _SCENE: _scene(),
@@ -38,9 +40,11 @@ def foxglove_layout(*, image_topic: str = "") -> dict[str, Any]:
     right: Any = _split(
         "column", _ERROR, _split("column", _HEALTH, _split("column", _RATIOS, _DIAGNOSTICS, 60), 33), 30
     )
-    if image_topic:
-        configs[_CAMERA] = {"imageMode": {"imageTopic": image_topic}}
-        right = _split("column", _CAMERA, right, 30)
+    for number, (images, drawn) in enumerate(cameras.items()):
+        panel = f"{_CAMERA}{number or ''}"
+        shown = {drawn: {"visible": True}} if drawn else {}
+        configs[panel] = {"imageMode": {"imageTopic": images, "annotations": shown}}
+        right = _split("column", panel, right, 30)
     return {
         "configById": configs,
         "globalVariables": {},
@@ -71,7 +75,8 @@ def _scene() -> dict[str, Any]:
             },
             "/wallkit/scan/kept": {**points, "flatColor": "#00c853"},
             "/wallkit/scan/rejected": {**points, "flatColor": "#ff1744"},
-            "/wallkit/scan/unknown": {**points, "flatColor": "#9e9e9e"},
+            "/wallkit/filter/kept": {**points, "visible": False, "flatColor": "#00c853"},
+            "/wallkit/filter/rejected": {**points, "visible": False, "flatColor": "#ff1744"},
         },
     }
 

@@ -5,7 +5,7 @@ Foxglove, rerun, evo, rosbags and `ros2 bag play` open it. Record time is the he
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 
@@ -23,6 +23,7 @@ from wallkit.core.types import (
     Trajectory,
     Transform,
 )
+from wallkit.logs.annotations import SCHEMA, TYPE, Drawn, annotations_message
 from wallkit.logs.cdr_write import CdrBuilder, planar_numbers
 from wallkit.logs.encode import cloud_message
 from wallkit.logs.writer import McapWriter
@@ -87,6 +88,17 @@ class ResultWriter:
         columns = {"x": xyz_m[:, 0], "y": xyz_m[:, 1], "z": xyz_m[:, 2], "weight": weights}
         cloud = cloud_message(stamp_ns, self._base, columns)
         self._file.write_cdr(f"/wallkit/scan/{name}", "sensor_msgs/msg/PointCloud2", stamp_ns, cloud)
+
+    def filtered(self, stamp_ns: int, name: str, xyz_m: Float32Array, weights: Float32Array) -> None:
+        """/wallkit/filter/NAME (kept, rejected): what the point filters made of the returns (K, 3), in frame base."""
+        columns = {"x": xyz_m[:, 0], "y": xyz_m[:, 1], "z": xyz_m[:, 2], "weight": weights}
+        cloud = cloud_message(stamp_ns, self._base, columns)
+        self._file.write_cdr(f"/wallkit/filter/{name}", "sensor_msgs/msg/PointCloud2", stamp_ns, cloud)
+
+    def annotations(self, stamp_ns: int, camera: str, things: Sequence[Drawn]) -> None:
+        """/wallkit/camera/NAME/annotations: masks and returns, to be laid over the image of that stamp."""
+        message = annotations_message(stamp_ns, things)
+        self._file.write_cdr(f"/wallkit/camera/{camera}/annotations", TYPE, stamp_ns, message, schema=SCHEMA)
 
     def grid(self, stamp_ns: int, grid: OccupancyGrid) -> None:
         """/wallkit/map: the map, once, at the first stamp."""

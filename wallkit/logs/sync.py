@@ -247,7 +247,9 @@ class _Synchroniser:
         self.report.images += len(views)
         if self._rig.cameras and not views:
             self.report.frames_without_image += 1
-        cloud_m = None if waiting.cloud is None or not views else transformed(waiting.cloud.points_m, self._rig.mount.matrix)
+        cloud_m = (
+            None if waiting.cloud is None or not views else transformed(waiting.cloud.points_m, self._rig.mount.matrix)
+        )
         return Frame(scan.stamp_ns, points, pose, gap_s, views, cloud_m=cloud_m)
 
     def _why_no_odometry(self, start_ns: int, end_ns: int) -> str:

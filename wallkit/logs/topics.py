@@ -147,6 +147,15 @@ def is_picture_name(topic: str) -> bool:
     return "depth" not in topic.lower() and not topic.startswith(ORACLE)
 
 
+def camera_of_topic(topic: str) -> str:
+    """ "front" of /camera/front/image/compressed; else the topic with dashes."""
+    words = [word for word in topic.split("/") if word]
+    if words[:1] == ["camera"] and len(words) > 2:
+        return words[1]
+    kept = [word for word in words if word not in ("compressed", "image", "image_raw")]
+    return "-".join(kept) or "camera"
+
+
 def transform_topics(log: Log) -> tuple[str, ...]:
     """Topics with transforms that change over time."""
     return tuple(dict.fromkeys(c.topic for c in log.channels_of(*TRANSFORM_KINDS) if not c.is_static))

@@ -14,7 +14,8 @@ from wallkit.pipelines.calib_overlay import picture_of
 from wallkit.pipelines.calib_verify import Verification, is_files, next_step, pixel_words, verdict_meaning
 from wallkit.pipelines.calib_verify_document import BOARD_DEFINITION
 from wallkit.points.overlay import jpeg_bytes
-from wallkit.report.verdict import Answer, Photo, VerdictData, verdict_html
+from wallkit.report.data import Photo
+from wallkit.report.verdict import Answer, VerdictData, verdict_html
 
 PHOTOS = 3
 _REASONS = 6

@@ -19,7 +19,7 @@ from wallkit.errors import DatasetError, LogError
 from wallkit.evaluate.tum import read_tum
 from wallkit.logs.images import pixels_from_image
 from wallkit.logs.reader import Log, open_log
-from wallkit.logs.topics import IMAGE_KINDS, SCAN_KINDS, pick_image, pick_truth
+from wallkit.logs.topics import IMAGE_KINDS, SCAN_KINDS, camera_of_topic, pick_image, pick_truth
 from wallkit.logs.trajectories import trajectory_of
 from wallkit.pipelines.simulate_camera import NO_CLASS, NO_INSTANCE
 
@@ -100,15 +100,6 @@ def sources_of(logs: tuple[Path, ...], image_topic: str, runs: tuple[Path, ...])
             name = f"{name}-{number}"
         found.append(Source(path, name, image_topic, runs[number] if runs else None))
     return found
-
-
-def camera_of_topic(topic: str) -> str:
-    """ "front" of /camera/front/image/compressed; else the topic with dashes."""
-    words = [word for word in topic.split("/") if word]
-    if words[:1] == ["camera"] and len(words) > 2:
-        return words[1]
-    kept = [word for word in words if word not in ("compressed", "image", "image_raw")]
-    return "-".join(kept) or "camera"
 
 
 def pictures_of(source: Source, labels: LabelSet, lost: dict[str, int]) -> Iterator[Labelled]:

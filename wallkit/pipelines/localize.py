@@ -18,7 +18,7 @@ from wallkit.core.geometry import interpolate_poses
 from wallkit.core.grid import distances_at
 from wallkit.core.steps import Steps
 from wallkit.core.types import Estimate, Float64Array, StampedPose, Trajectory
-from wallkit.errors import ConfigError, LogError
+from wallkit.errors import ConfigError, LogError, WallkitError
 from wallkit.evaluate.resources import Mark, Timers, mark_now
 from wallkit.evaluate.tum import read_tum
 from wallkit.localize.ekf import ScanMatchingEkf, scan_matching_ekf
@@ -31,10 +31,13 @@ from wallkit.logs.rig import Rig, Wanted, find_rig
 from wallkit.logs.sync import SyncReport, synchronise
 from wallkit.logs.topics import pick_initial_pose, pick_truth
 from wallkit.logs.trajectories import first_pose, trajectory_of
+from wallkit.pipelines.cameras import CameraRequest
 from wallkit.pipelines.config import Config
 from wallkit.pipelines.maps import LoadedMap, load_map
 from wallkit.pipelines.recorder import MessageWriter, Recorder
-from wallkit.points.filters import apply_filters
+from wallkit.pipelines.sight import Sight, sight_of
+from wallkit.pipelines.watch import Filtering, Moment, Watch
+from wallkit.points.filters import WITH_CAMERA, apply_filters
 from wallkit.points.labels import labelled_scan
 from wallkit.report.data import Snapshot
 
@@ -49,6 +52,7 @@ class Request:
         truth: a topic, "map->base_link", a TUM file, or None for what the log calls its truth.
         start_s, end_s: seconds from the first scan; None for all.
         wanted: topics and frames named by the user.
+        cameras: what filters look through, when one of them needs a camera or a model is named.
     """
 
     logs: tuple[Path, ...]
@@ -59,11 +63,20 @@ class Request:
     start_s: float | None = None
     end_s: float | None = None
     wanted: Wanted = field(default_factory=Wanted)
+    cameras: CameraRequest = field(default_factory=CameraRequest)
+
+    def looks(self, config: Config) -> bool:
+        """Whether cameras are used."""
+        return config.points.needs_camera or bool(self.cameras.model or self.cameras.calibrations)
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """Everything found and checked before the first scan is looked at."""
+    """Everything found and checked before the first scan is looked at.
+
+    Attributes:
+        sight: the cameras; None without. fallen_back: why they are not used although they were asked for.
+    """
 
     request: Request
     config: Config
@@ -73,6 +86,8 @@ class Prepared:
     truth: Trajectory | None
     start: StampedPose | str
     window_ns: tuple[int | None, int | None]
+    sight: Sight | None = None
+    fallen_back: str = ""
 
 
 @dataclass(frozen=True)
@@ -84,6 +99,7 @@ class Run:
         estimate: the last one; its modes are every place the robot may be then.
         odometry: at every scan. snapshots: particles at a few moments.
         sync, loss: what was dropped on the way. timers: seconds by phase. mark: when the run began.
+        filtering: what the point filters left; None without them. sights: a few moments to draw.
     """
 
     prepared: Prepared
@@ -95,6 +111,8 @@ class Run:
     loss: Loss
     timers: Timers
     mark: Mark
+    filtering: Filtering | None = None
+    moments: tuple[Moment, ...] = ()
 
 
 Observer = Callable[[int], None]
@@ -103,14 +121,20 @@ Observer = Callable[[int], None]
 TRUTH_SD = (0.1, 0.1, np.deg2rad(3.0))
 
 
-def prepare(request: Request, config: Config) -> Prepared:
+def prepare(request: Request, config: Config, *, seeds: int = 1) -> Prepared:
     """Open the log and the map, and find what is needed in them.
+
+    Args:
+        seeds: how many runs there will be: images are segmented for the first only.
 
     Raises:
         WallkitError: something is missing; nothing has been computed or written yet.
     """
     log = open_log(request.logs)
     rig = find_rig(log, request.wanted)
+    sight, config, fallen_back = _find_sight(log, rig, request, config, holds_scans=seeds > 1)
+    if sight is not None:
+        rig = replace(rig, cameras=tuple(camera.wanted for camera in sight.cameras))
     map_path = request.map or (Path(config.map) if config.map else None)
     loaded = load_map(map_path, log, config.maps)
     truth = _find_truth(log, request.truth)
@@ -118,11 +142,16 @@ def prepare(request: Request, config: Config) -> Prepared:
     start = _find_start(log, request, truth, rig, window)
     if isinstance(start, StampedPose):
         _check_on_map(start.pose, loaded)
-    return Prepared(request, config, log, rig, loaded, truth, start, window)
+    return Prepared(request, config, log, rig, loaded, truth, start, window, sight, fallen_back)
 
 
 def localize(
-    prepared: Prepared, *, result_mcap: Path | None = None, observe: Observer | None = None, mark: Mark | None = None
+    prepared: Prepared,
+    *,
+    result_mcap: Path | None = None,
+    observe: Observer | None = None,
+    mark: Mark | None = None,
+    moments: int = 0,
 ) -> Run:
     """Run the filter over the whole log.
 
@@ -130,6 +159,7 @@ def localize(
         result_mcap: where to write every step as messages; None does not.
         observe: called with the number of scans done after each.
         mark: when the run began, for its times.
+        moments: how many images to keep with what the filters made of them.
     """
     p, timers, mark = prepared, Timers(), mark or mark_now()
     with timers.phase("prepare"):
@@ -137,26 +167,67 @@ def localize(
     rng = np.random.default_rng(np.random.SeedSequence(p.request.seed))
     belief: Any = tracker.start(rng, p.start)  # type: ignore[arg-type]  # _tracker refuses a spread for the EKF
     sync, recorder = SyncReport(), Recorder()
+    watch = Watch(p.config.points, p.sight, moments)
     frames = synchronise(p.log, p.rig, p.config.logs, report=sync, start_ns=p.window_ns[0], end_ns=p.window_ns[1])
     with _message_writer(p, result_mcap) as messages:
         for frame in timers.each("read", frames):
             with timers.phase("filter"):
                 began = time.perf_counter_ns()
                 belief = tracker.predict(rng, belief, frame.odometry, frame.odometry_gap_s)
-                scan = apply_filters(filters, labelled_scan(frame), belief.estimate())
+                scan, seen = labelled_scan(frame), None
+                # an image is looked at only for an update: most scans need none
+                if p.sight is not None and tracker.wants(belief, scan):
+                    seen = p.sight.labels_of(frame)
+                    scan = labelled_scan(replace(frame, labels=seen.labels))
+                scan = apply_filters(filters, scan, belief.estimate())
                 belief, info = tracker.update(rng, belief, scan)
                 elapsed_ms = (time.perf_counter_ns() - began) / 1e6
             estimate = belief.estimate(frame.stamp_ns)
-            recorder.add(frame, estimate, info, belief, elapsed_ms)
+            recorder.add(frame, estimate, info, belief, elapsed_ms + (seen.owed_ms if seen else 0.0))
+            if filters and info.is_update:
+                watch.add(frame, scan, seen)
             if messages:
                 with timers.phase("write"):
                     messages.add(frame, estimate, info, belief)
+                    if filters and info.is_update:
+                        messages.add_filtered(frame, scan, seen)
             if observe:
                 observe(len(recorder))
     final = replace(estimate, modes=tracker.candidates(belief))
     return Run(
-        p, recorder.steps(), final, recorder.odometry(), tuple(recorder.snapshots), sync, p.log.loss, timers, mark
+        p,
+        recorder.steps(),
+        final,
+        recorder.odometry(),
+        tuple(recorder.snapshots),
+        sync,
+        p.log.loss,
+        timers,
+        mark,
+        watch.filtering() if filters else None,
+        watch.moments(),
     )
+
+
+def _find_sight(
+    log: Log, rig: Rig, request: Request, config: Config, *, holds_scans: bool
+) -> tuple[Sight | None, Config, str]:
+    """The cameras, the settings, and why there are none: the user let the LiDAR alone stand in for them.
+
+    Raises:
+        WallkitError: cameras are needed and cannot be used.
+    """
+    if not request.looks(config):
+        return None, config, ""
+    try:
+        sight = sight_of(log, request.cameras, config.points, config.segment, rig=rig, holds_scans=holds_scans)
+    except WallkitError as error:
+        if not request.cameras.may_fall_back:
+            raise
+        left = tuple(name for name in config.points.filters if name not in WITH_CAMERA)
+        reason = f"{error.where}: {error.message}" if error.where else error.message
+        return None, replace(config, points=replace(config.points, filters=left)), reason
+    return sight, config, ""
 
 
 def _tracker(p: Prepared) -> MonteCarloLocalizer | ScanMatchingEkf:

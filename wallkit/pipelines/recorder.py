@@ -11,11 +11,13 @@ from wallkit.core.config import setting
 from wallkit.core.geometry import compose, invert, wrap_angle
 from wallkit.core.raycast import HIT
 from wallkit.core.steps import Steps
-from wallkit.core.types import Estimate, Float64Array, Frame, Health, OccupancyGrid, Trajectory
+from wallkit.core.types import Estimate, Float64Array, Frame, Health, LabelledScan, OccupancyGrid, Trajectory
 from wallkit.localize.belief import Belief, StepInfo
 from wallkit.localize.ekf import GaussianBelief
 from wallkit.localize.particles import normalised
 from wallkit.logs.results import ResultWriter
+from wallkit.pipelines.annotations import annotations_of
+from wallkit.pipelines.sight import Labelled
 from wallkit.report.data import Snapshot
 
 # so many moments at most are kept for the report, besides the first and the last
@@ -137,6 +139,16 @@ class MessageWriter:
             w.path(stamp, Trajectory(np.array(self._path_stamps, dtype=np.int64), np.array(self._path_poses)))
         if info.is_update:
             self._add_update(frame, estimate, info, belief)
+
+    def add_filtered(self, frame: Frame, scan: LabelledScan, seen: Labelled | None) -> None:
+        """What the point filters made of an update's scan, and what cameras saw."""
+        if not self._settings.points:
+            return
+        stamp, kept = frame.stamp_ns, scan.weights >= 0.5
+        for name, chosen in (("kept", kept), ("rejected", ~kept)):
+            self._writer.filtered(stamp, name, frame.points.xyz_m[chosen], scan.weights[chosen])
+        for glance in seen.glances if seen else ():
+            self._writer.annotations(glance.view.image.stamp_ns, glance.camera.name, annotations_of(glance, scan))
 
     def _add_update(self, frame: Frame, estimate: Estimate, info: StepInfo, belief: Belief | GaussianBelief) -> None:
         stamp, w, e = frame.stamp_ns, self._writer, info.evidence

@@ -49,6 +49,7 @@ def report_data(record: RunRecord, evaluation: Evaluation, settings: EvaluateSet
         snapshots=record.snapshots,
         dropped={**record.run["dropped"], **no_truth},
         settings=record.settings,
+        photos=record.photos,
     )
 
 

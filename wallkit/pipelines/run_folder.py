@@ -28,7 +28,9 @@ from wallkit.logs.reader import open_log
 from wallkit.pipelines.config import Config, LoadedConfig
 from wallkit.pipelines.evaluate import Evaluation
 from wallkit.pipelines.localize import Run
-from wallkit.report.data import Setting, Snapshot, settings_from_tables
+from wallkit.pipelines.overlays import read_overlays
+from wallkit.pipelines.watch import NO_FILTERING
+from wallkit.report.data import Photo, Setting, Snapshot, settings_from_tables
 
 RESULT_MCAP = "result.mcap"
 
@@ -40,6 +42,7 @@ class RunRecord:
     Attributes:
         name: what was localized. answer: metrics.json. run: run.json.
         grid, snapshots: for the report; missing where result.mcap or snapshots.npz are.
+        photos: of OVERLAYS, for the report.
     """
 
     name: str
@@ -50,6 +53,7 @@ class RunRecord:
     truth: Trajectory | None
     grid: OccupancyGrid | None
     snapshots: tuple[Snapshot, ...]
+    photos: tuple[Photo, ...] = ()
 
     @property
     def settings(self) -> tuple[Setting, ...]:
@@ -58,8 +62,8 @@ class RunRecord:
 
     @property
     def resources(self) -> dict[str, Value]:
-        """Time, CPU and memory of the process that made the run."""
-        known = usage_since(mark_now())
+        """Time, CPU and memory of the process that made the run, and what its point filters left."""
+        known = {**usage_since(mark_now()), **{k: v for k, v in NO_FILTERING.values().items() if k in self.answer}}
         return {k: Value(k, self.answer.get(k), v.unit, v.definition, v.better) for k, v in known.items()}
 
 
@@ -91,7 +95,11 @@ def write_run(folder: Path, record: RunRecord) -> None:
     write_json(folder / "metrics.json", record.answer)
     write_json(folder / "run.json", record.run)
     if (folder / RESULT_MCAP).exists():
-        write_layout(folder / "foxglove-layout.json")
+        cameras = record.run.get("filtering", {}).get("cameras", [])
+        annotated = {
+            c["picture_topic"]: f"/wallkit/camera/{c['name']}/annotations" for c in cameras if c["picture_topic"]
+        }
+        write_layout(folder / "foxglove-layout.json", cameras=annotated)
 
 
 def read_run(folder: Path) -> RunRecord:
@@ -115,6 +123,7 @@ def read_run(folder: Path) -> RunRecord:
         read_tum(truth) if truth.is_file() else None,
         _read_grid(folder / RESULT_MCAP),
         _read_snapshots(folder / "snapshots.npz"),
+        read_overlays(folder),
     )
 
 
@@ -169,7 +178,8 @@ def machine() -> dict[str, Any]:
 def _answer(run: Run, evaluation: Evaluation) -> dict[str, Any]:
     """metrics.json: the answer, every hypothesis alive at the end, and the numbers by key."""
     e = run.estimate
-    numbers = {**evaluation.metrics, **usage_since(run.mark)}
+    of_filters = run.filtering.values() if run.filtering else {}
+    numbers = {**evaluation.metrics, **of_filters, **usage_since(run.mark)}
     return {
         "schema": 1,
         "health": e.health.name,
@@ -200,13 +210,20 @@ def _provenance(run: Run, loaded: LoadedConfig) -> dict[str, Any]:
         "inputs": [{"path": str(f), "bytes": f.stat().st_size, "sha256": sha256(f)} for f in files],
         "dropped": dropped(run),
         "lost": run.loss.lines(),
-        "notes": [*run.loss.notes, *(str(finding) for finding in p.map.findings)],
+        "notes": [*run.loss.notes, *(str(finding) for finding in p.map.findings), *_notes_on_cameras(run)],
+        **({"filtering": run.filtering.document()} if run.filtering else {}),
         "seconds": run.timers.seconds,
         "machine": machine(),
         "config_file": str(loaded.path) if loaded.path else None,
         "config": table_from(loaded.config),
         "origins": loaded.origins,
     }
+
+
+def _notes_on_cameras(run: Run) -> list[str]:
+    p = run.prepared
+    notes = [note for camera in (p.sight.cameras if p.sight else ()) for note in camera.notes]
+    return [*notes, *([f"the LiDAR alone was used: {p.fallen_back}"] if p.fallen_back else [])]
 
 
 def _pose(pose: Any, sd: Any) -> dict[str, float]:

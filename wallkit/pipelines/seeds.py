@@ -12,8 +12,10 @@ from wallkit.evaluate.statistics import summarise
 from wallkit.pipelines.config import LoadedConfig
 from wallkit.pipelines.evaluate import Evaluation, evaluate_steps
 from wallkit.pipelines.localize import Observer, Prepared, Run, localize
+from wallkit.pipelines.overlays import REPORT_DEFAULT, write_overlays
 from wallkit.pipelines.report import write_run_report
 from wallkit.pipelines.run_folder import RESULT_MCAP, RunRecord, record_of, write_json, write_run
+from wallkit.report.data import Photo
 
 Records = Sequence[tuple[RunRecord, Evaluation]]
 
@@ -36,14 +38,21 @@ def run_seed(
     if seed is not None:
         prepared = replace(prepared, request=replace(prepared.request, seed=seed))
         folder.mkdir(parents=True)
-    run = localize(prepared, result_mcap=folder / RESULT_MCAP if is_alone else None, observe=observe, mark=mark)
+    moments = prepared.request.cameras.overlays or (REPORT_DEFAULT if is_alone else 0)
+    result_mcap = folder / RESULT_MCAP if is_alone else None
+    run = localize(prepared, result_mcap=result_mcap, observe=observe, mark=mark, moments=moments)
     evaluation = evaluate_steps(run.steps, prepared.truth, prepared.config.evaluate)
+    wants_files = prepared.request.cameras.overlays > 0
+    photos: tuple[Photo, ...] = ()
+    if is_alone or wants_files:
+        with run.timers.phase("report"):
+            photos = write_overlays(folder, prepared.log, run.moments, with_files=wants_files)
     if is_alone:
         with run.timers.phase("report"):
             # drawn before the numbers are written, so that they include its time and memory
-            record = record_of(run, evaluation, loaded)
+            record = replace(record_of(run, evaluation, loaded), photos=photos)
             write_run_report(folder / "report.html", record, evaluation, prepared.config.evaluate)
-    record = record_of(run, evaluation, loaded)
+    record = replace(record_of(run, evaluation, loaded), photos=photos)
     write_run(folder, record)
     return run, record, evaluation
 

@@ -47,7 +47,9 @@ class LineFit:
         # in the order of the beams; of a cloud's slice that is the order of bearing
         order = np.argsort(points.beams, kind="stable")
         found = np.full(len(xy), -1)
-        limits = np.array([self.tolerance_m, self.tolerance_per_m, self.gap_m, self.gap_per_m, self.piece_m, self.wall_m])
+        limits = np.array(
+            [self.tolerance_m, self.tolerance_per_m, self.gap_m, self.gap_per_m, self.piece_m, self.wall_m]
+        )
         ordered = np.full(len(xy), -1)
         _find_walls(xy[order], points.ranges_m[order].astype(np.float64), limits, self.piece_points, ordered)
         found[order] = ordered

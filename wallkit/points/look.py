@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numba import njit
@@ -34,6 +34,9 @@ ClassesAt = Callable[[Float64Array], tuple[Int64Array, Float32Array]]
 class LookSettings:
     """How sure it is where a point lands in the image, and whether it is seen there at all."""
 
+    lookup: Literal["pixels", "crossing_number", "winding_number", "even_odd", "mask"] = setting(
+        "pixels", "what says the class at a pixel: the model itself, or which of its polygons holds it, and how"
+    )
     margins: float = setting(1.0, "how far the error of a pixel counts; 0: the pixel itself decides", low=0)
     unknown_error_px: float = setting(3.0, "95 % pixel error where the calibration does not say its own", low=0)
     time_sigma_s: float = setting(0.002, "sigma of the time offset where the calibration does not say its own", low=0)
@@ -78,7 +81,11 @@ def project_frame(
     if frame.cloud_m is not None:
         cloud = project(calibration, moved_to(frame.cloud_m, motion, T_lidar_base), allow_unverified=True)
         is_seen = is_seen & ~hidden(
-            projection, cloud, reach_px=settings.hidden_px, margin_m=settings.hidden_m, margin_per_m=settings.hidden_per_m
+            projection,
+            cloud,
+            reach_px=settings.hidden_px,
+            margin_m=settings.hidden_m,
+            margin_per_m=settings.hidden_per_m,
         )
     return projection, is_seen, _margins_px(calibration, frame, view, projection, settings)
 

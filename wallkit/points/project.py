@@ -74,7 +74,9 @@ def moved_to(points_m: ArrayLike, motion: Float64Array, T_lidar_base: Float64Arr
     return np.asarray(np.asarray(points_m, dtype=np.float64) @ T[:3, :3].T + T[:3, 3])
 
 
-def hidden(points: Projection, others: Projection, *, reach_px: float, margin_m: float, margin_per_m: float) -> BoolArray:
+def hidden(
+    points: Projection, others: Projection, *, reach_px: float, margin_m: float, margin_per_m: float
+) -> BoolArray:
     """(K,) which points have something else before them as the camera sees it: another point nearer to it than a margin.
 
     Args:

@@ -54,6 +54,7 @@ class ReportData:
         episodes: stretches of wrong estimates, from `evaluate`.
         snapshots: particles at chosen updates.
         dropped: what was left out of the log and of the evaluation, and how many.
+        photos: what a camera saw, and what the point filters made of the returns there.
     """
 
     title: str
@@ -71,6 +72,7 @@ class ReportData:
     snapshots: tuple[Snapshot, ...] = ()
     dropped: Mapping[str, int] = field(default_factory=dict)
     settings: tuple[Setting, ...] = ()
+    photos: tuple[Photo, ...] = ()
     headline: tuple[str, ...] = (
         "ate_rmse_m",
         "ate_median_m",
@@ -80,6 +82,7 @@ class ReportData:
         "availability",
         "updates_to_converge",
         "seconds_to_converge",
+        "kept_share",
         "update_mean_ms",
         "cpu_percent",
         "peak_memory_mb",
@@ -95,6 +98,14 @@ class Picture:
     caption: str
     alt: str
     svg: bytes
+
+
+@dataclass(frozen=True)
+class Photo:
+    """A picture with points on it: what it shows, and JPEG bytes."""
+
+    caption: str
+    jpeg: bytes
 
 
 def settings_from_tables(

@@ -12,7 +12,7 @@ from typing import Any
 
 from wallkit.errors import OutputError
 from wallkit.report.compare import CompareData, compare_figures, compare_rows, difference_rows
-from wallkit.report.data import Picture, ReportData
+from wallkit.report.data import Photo, Picture, ReportData
 from wallkit.report.figures import draw_figures
 from wallkit.report.wording import doubts, episode_rows, plain, run_rows, value_text
 
@@ -55,6 +55,8 @@ def report_html(data: ReportData) -> str:
         changed=[s for s in data.settings if not s.is_default],
         unchanged=[s for s in data.settings if s.is_default],
         run=run_rows(data.run),
+        filtering=data.run.get("filtering"),
+        photos=[(photo.caption, jpeg_uri(photo)) for photo in data.photos],
     )
 
 
@@ -82,6 +84,11 @@ def rendered(template: str, **values: Any) -> str:
     )
     environment.filters.update(value_text=value_text, plain=plain, data_uri=_data_uri)
     return environment.get_template(template).render(marks=_MARKS, **values)
+
+
+def jpeg_uri(photo: Photo) -> str:
+    """The picture itself as an address."""
+    return "data:image/jpeg;base64," + base64.b64encode(photo.jpeg).decode()
 
 
 def _data_uri(picture: Picture) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,8 +10,8 @@ import numpy as np
 from wallkit.core.types import Float64Array
 from wallkit.report import canvas
 from wallkit.report.canvas import Key
-from wallkit.report.data import Picture, Tone
-from wallkit.report.html import rendered
+from wallkit.report.data import Photo, Picture, Tone
+from wallkit.report.html import jpeg_uri, rendered
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,14 +32,6 @@ class Answer:
     refused: str
     reason: str
     basis: str
-
-
-@dataclass(frozen=True, slots=True)
-class Photo:
-    """A picture with points on it: what it shows, and JPEG bytes."""
-
-    caption: str
-    jpeg: bytes
 
 
 @dataclass(frozen=True)
@@ -85,7 +76,7 @@ def verdict_html(data: VerdictData) -> str:
         data=data,
         tone=TONES[data.verdict],
         pictures=pictures,
-        photos=[(p.caption, "data:image/jpeg;base64," + base64.b64encode(p.jpeg).decode()) for p in data.photos],
+        photos=[(photo.caption, jpeg_uri(photo)) for photo in data.photos],
     )
 
 

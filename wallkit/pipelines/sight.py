@@ -1,0 +1,255 @@
+"""Frames -> what the cameras' images show where each return landed: BeamLabels, each scan's but once for all seeds."""
+
+from __future__ import annotations
+
+import time
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from wallkit.core.geometry import invert_matrix
+from wallkit.core.segmentation import Segmentation, Segmenter
+from wallkit.core.types import BeamLabels, CameraImage, Float64Array, Frame, Int64Array, UInt8Array, View
+from wallkit.errors import ConfigError, LogError, ModelError
+from wallkit.logs.images import pixels_from_image
+from wallkit.logs.reader import Log
+from wallkit.logs.rig import Rig
+from wallkit.pipelines.cameras import ORACLE_MODEL, Camera, CameraRequest, find_cameras, ids_from_png, oracle_names
+from wallkit.points.filters import PointsSettings
+from wallkit.points.look import ClassesAt, Look, LookSettings, look, project_frame
+from wallkit.points.outlines import classes_by_outlines
+
+if TYPE_CHECKING:
+    from wallkit.segment.settings import SegmentSettings
+
+# segmented images that are held: scans may be more frequent than images
+_IMAGES_HELD = 4
+# labels of so many scans are held for the next seed: some 250 MB at 1,080 beams
+_SCANS_HELD = 4096
+# so many scans may be without an image, or without anything that counts as kept, before that is an error
+PATIENCE = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Glance:
+    """One camera's image at one scan: its segmentation and what it says about the returns."""
+
+    camera: Camera
+    view: View
+    segmentation: Segmentation
+    look: Look
+
+
+@dataclass(frozen=True, eq=False)
+class Labelled:
+    """What all cameras say about a scan.
+
+    Attributes:
+        labels: None where no image belongs to the scan.
+        glances: of each camera; not held for later seeds.
+        cost_ms: of decoding and segmenting the images. owed_ms: what of it was spent for an earlier seed.
+    """
+
+    labels: BeamLabels | None
+    glances: tuple[Glance, ...] = ()
+    cost_ms: float = 0.0
+    owed_ms: float = 0.0
+
+
+@dataclass
+class Sight:
+    """The cameras of a run and the model that looks through them.
+
+    Attributes:
+        model: what the user called it. segment: an image -> its Segmentation.
+        roles: what the model's classes count as, in its order; classes: these, each once: those of BeamLabels.
+        T_lidar_base: (4, 4). kept: classes of which something must be seen. may_fall_back: see CameraRequest.
+        holds_scans: whether labels are kept for the next seed; their cost is then counted again.
+    """
+
+    cameras: tuple[Camera, ...]
+    model: str
+    segment: Callable[[CameraImage], Segmentation]
+    roles: tuple[str, ...]
+    T_lidar_base: Float64Array
+    settings: LookSettings
+    kept: tuple[str, ...] = ()
+    may_fall_back: bool = False
+    holds_scans: bool = False
+    log_name: str = ""
+    classes: tuple[str, ...] = field(init=False)
+    _class_of: Int64Array = field(init=False)
+    _images: OrderedDict[tuple[str, int], tuple[Segmentation, float]] = field(default_factory=OrderedDict)
+    _scans: OrderedDict[int, Labelled] = field(default_factory=OrderedDict)
+    _asked: int = 0
+    _without_image: int = 0
+    _without_kept: int = 0
+
+    def __post_init__(self) -> None:
+        self.classes = tuple(dict.fromkeys(self.roles))
+        self._class_of = np.array([*(self.classes.index(role) for role in self.roles), -1])
+
+    def labels_of(self, frame: Frame) -> Labelled:
+        """What the cameras say about a frame's returns.
+
+        Raises:
+            LogError: none of the first scans has an image. ModelError: none of the first images shows what is kept.
+        """
+        if frame.stamp_ns in self._scans:
+            return self._scans[frame.stamp_ns]
+        glances, cost_ms = [], 0.0
+        for camera in self.cameras:
+            view = next((v for v in frame.views if v.topic == camera.topic), None)
+            if view is None:
+                continue
+            segmentation, ms = self._segmented(view)
+            cost_ms += ms
+            located = project_frame(camera.calibration, frame, view, self.T_lidar_base, self.settings)
+            seen = look(located, self._classes_at(segmentation), self._class_of, len(self.classes))
+            glances.append(Glance(camera, view, segmentation, seen))
+        found = Labelled(_merged(frame, glances, self.classes), tuple(glances), cost_ms)
+        self._check(found)
+        if self.holds_scans and len(self._scans) < _SCANS_HELD:
+            self._scans[frame.stamp_ns] = Labelled(found.labels, (), cost_ms, cost_ms)
+        return found
+
+    def _segmented(self, view: View) -> tuple[Segmentation, float]:
+        """The image's segmentation, and what it cost [ms]; 0 for an image that the scan before had too."""
+        key = view.topic, view.image.stamp_ns
+        if key in self._images:
+            return self._images[key][0], 0.0
+        began = time.perf_counter_ns()
+        segmentation = self.segment(view.image)
+        cost_ms = (time.perf_counter_ns() - began) / 1e6
+        self._images[key] = segmentation, cost_ms
+        while len(self._images) > _IMAGES_HELD * len(self.cameras):
+            self._images.popitem(last=False)
+        return segmentation, cost_ms
+
+    def _classes_at(self, segmentation: Segmentation) -> ClassesAt:
+        if self.settings.lookup == "pixels":
+            return segmentation.classes_at
+        return classes_by_outlines(segmentation, self.settings.lookup)
+
+    def _check(self, found: Labelled) -> None:
+        """Say early what will not get better."""
+        self._asked += 1
+        self._without_image += found.labels is None
+        shown = set() if found.labels is None else {self.classes[c] for c in np.unique(found.labels.labels) if c >= 0}
+        self._without_kept += not (set(self.kept) & shown)
+        if self._asked != PATIENCE or self.may_fall_back:
+            return
+        if self._without_image == PATIENCE:
+            hint = "compare stamps in `wallkit log info`; --set logs.image_tolerance_s=0.2, or --fallback lidar"
+            raise LogError(
+                f"none of the first {PATIENCE} scans has an image within the tolerance", where=self.log_name, hint=hint
+            )
+        if self.kept and self._without_kept == PATIENCE:
+            hint = "is it the model for these images? Look at them with --overlay 4 and --fallback lidar"
+            listed = ", ".join(self.kept)
+            raise ModelError(
+                f"finds no {listed} under any return of the first {PATIENCE} scans", where=self.model, hint=hint
+            )
+
+
+def sight_of(
+    log: Log,
+    request: CameraRequest,
+    points: PointsSettings,
+    segment: SegmentSettings,
+    *,
+    rig: Rig,
+    holds_scans: bool = False,
+) -> Sight:
+    """The cameras and the model, checked.
+
+    Raises:
+        WallkitError: as `find_cameras`; ModelError: the model cannot be used, or knows nothing of what filters keep.
+        ConfigError: no model is named.
+    """
+    model = request.model or segment.model
+    if not model:
+        hint = "--model FILE.onnx, or --model oracle for a simulated log with masks"
+        raise ConfigError("a camera filter needs a model that says what images show", where="--model", hint=hint)
+    is_oracle = model == ORACLE_MODEL
+    cameras = find_cameras(log, request, is_oracle=is_oracle, lidar_frame=rig.lidar_frame)
+    looks, names, roles = _oracle(log, segment) if is_oracle else _network(model, segment)
+    kept = _kept(points)
+    if kept and not set(kept) & set(roles):
+        listed = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
+        hint = (
+            f"say which of its classes counts: --set 'segment.roles.{kept[0]}=[\"NAME\"]'; or --filter reject_dynamic"
+        )
+        raise ModelError(f"no class counts as {' or '.join(kept)} (classes: {listed})", where=model, hint=hint)
+    return Sight(
+        cameras,
+        model,
+        looks,
+        roles,
+        invert_matrix(rig.mount.matrix),
+        points.look,
+        kept=kept,
+        may_fall_back=request.may_fall_back,
+        holds_scans=holds_scans,
+        log_name=log.name,
+    )
+
+
+def picture_of(image: CameraImage) -> UInt8Array:
+    """(H, W, 3) RGB of a recorded image."""
+    pixels = pixels_from_image(image)
+    return pixels if pixels.ndim == 3 else np.repeat(pixels[..., None], 3, axis=2)
+
+
+Looks = tuple[Callable[[CameraImage], Segmentation], tuple[str, ...], tuple[str, ...]]
+
+
+def _oracle(log: Log, settings: SegmentSettings) -> Looks:
+    """What a simulator recorded, as a model that is never wrong."""
+    from wallkit.pipelines.simulate_camera import NO_CLASS
+    from wallkit.segment.class_map import class_map
+
+    names = oracle_names(log)
+
+    def segment(image: CameraImage) -> Segmentation:
+        return class_map(ids_from_png(image), names, settings.roles, nothing=NO_CLASS)
+
+    return segment, names, settings.roles.of(names)
+
+
+def _network(model: str, settings: SegmentSettings) -> Looks:
+    from pathlib import Path
+
+    from wallkit.segment.onnx_segmenter import load_segmenter
+
+    segmenter: Segmenter = load_segmenter(Path(model), settings)
+
+    def segment(image: CameraImage) -> Segmentation:
+        return segmenter.segment(pixels_from_image(image))
+
+    return segment, segmenter.names, segmenter.roles
+
+
+def _kept(points: PointsSettings) -> tuple[str, ...]:
+    """Classes without which a chosen filter would throw everything away."""
+    return points.wall_mask.keep if "wall_mask" in points.filters else ()
+
+
+def _merged(frame: Frame, glances: list[Glance], classes: tuple[str, ...]) -> BeamLabels | None:
+    """The labels of all cameras by beam; where two see a return, the one that knows better where it landed counts."""
+    if not glances:
+        return None
+    beams = frame.points.beams
+    count = int(beams.max()) + 1 if len(beams) else 0
+    labels, sure = np.full(count, -1), np.zeros(count, dtype=np.float32)
+    shares, best = np.zeros((count, len(classes)), dtype=np.float32), np.full(count, np.inf)
+    for glance in glances:
+        found = glance.look
+        better = (found.labels >= 0) & (found.margins_px < best[beams])
+        at = beams[better]
+        labels[at], sure[at] = found.labels[better], found.confidences[better]
+        shares[at], best[at] = found.shares[better], found.margins_px[better]
+    return BeamLabels(frame.stamp_ns, labels, classes, sure, shares)
