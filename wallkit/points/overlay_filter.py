@@ -77,14 +77,18 @@ def _with_points(rgb: UInt8Array, pixels: Float64Array, colours: Float64Array, i
     import cv2
 
     canvas, radius = rgb.copy(), max(2, round(rgb.shape[1] / 240))
-    for (u, v), colour, kept in zip(np.round(pixels).astype(int), colours, is_kept, strict=True):
-        ink = tuple(int(c) for c in colour)
-        at = int(u), int(v)
+    places = [(int(u), int(v)) for u, v in np.round(pixels)]
+    # every rim first, so that neighbours do not cover one another
+    for at, kept in zip(places, is_kept, strict=True):
         if kept:
             cv2.circle(canvas, at, radius + 1, (255, 255, 255), -1, cv2.LINE_AA)
-            cv2.circle(canvas, at, radius, ink, -1, cv2.LINE_AA)
         else:
             cv2.drawMarker(canvas, at, (255, 255, 255), cv2.MARKER_TILTED_CROSS, 2 * radius + 3, 3, cv2.LINE_AA)
+    for at, kept, colour in zip(places, is_kept, colours, strict=True):
+        ink = tuple(int(c) for c in colour)
+        if kept:
+            cv2.circle(canvas, at, radius, ink, -1, cv2.LINE_AA)
+        else:
             cv2.drawMarker(canvas, at, ink, cv2.MARKER_TILTED_CROSS, 2 * radius + 3, 1, cv2.LINE_AA)
     return canvas
 
