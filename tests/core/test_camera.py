@@ -8,6 +8,7 @@ import pytest
 
 from wallkit.core.camera import Camera, camera_from_info
 from wallkit.core.lenses import CAMERAS
+from wallkit.core.projection import project_points
 from wallkit.core.types import CameraInfo
 from wallkit.errors import CalibrationError
 
@@ -162,3 +163,20 @@ def test_camera_info_gives_the_same_camera():
     cam = camera_from_info(info)
     assert cam.frame == "optical"
     np.testing.assert_array_equal(cam.parameters, camera("plumb_bob").parameters)
+
+
+@pytest.mark.parametrize("model", CAMERAS)
+def test_the_compiled_projection_is_the_cameras(model):
+    rng = np.random.default_rng(4)
+    one = camera(model)
+    T = np.eye(4)
+    T[:3, :3] = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    T[:3, 3] = rng.normal(size=3)
+    points = rng.uniform(-4, 4, (500, 3)).astype(np.float32)
+    points[0] = np.nan
+    seen = points @ T[:3, :3].T + T[:3, 3]
+    pixels, depths, inside = project_points(one, T, points)
+    np.testing.assert_allclose(pixels, one.project(seen), rtol=1e-9, atol=1e-7)
+    np.testing.assert_allclose(depths, seen[:, 2], rtol=1e-9, atol=1e-12)
+    np.testing.assert_array_equal(inside, one.is_inside(one.project(seen)))
+    assert inside.sum() > 20

@@ -13,6 +13,7 @@ from tests.logs.drawn import SECOND_NS, START_NS
 from wallkit.core.geometry import compose, relative
 from wallkit.core.types import Estimate, Health, OccupancyGrid, Odometry, StampedPose, Trajectory
 from wallkit.errors import OutputError
+from wallkit.logs.annotations import Drawn
 from wallkit.logs.frames import moving_transforms
 from wallkit.logs.layout import foxglove_layout, write_layout
 from wallkit.logs.reader import open_log
@@ -26,6 +27,8 @@ STAMPS = START_NS + np.arange(STEPS, dtype=np.int64) * SECOND_NS // 10 + 7
 POSES = np.stack([np.linspace(0, 2, STEPS), np.sin(np.linspace(0, 1, STEPS)), np.linspace(3.0, 3.3, STEPS)], axis=-1)
 ODOMETRY = compose([1.0, -1.0, 0.5], POSES)
 COVARIANCE = np.diag([0.01, 0.02, 0.03])
+SQUARE = np.array([[10.0, 20.0], [30.0, 20.0], [30.0, 40.0]])
+BLUE = (0.0, 0.0, 1.0, 0.5)
 GRID = OccupancyGrid(np.arange(-1, 11, dtype=np.int8).reshape(3, 4), 0.05, np.array([1.0, 2.0, 0.3]))
 
 
@@ -39,8 +42,10 @@ def write_results(path):
             result.odometry(stamp, ODOMETRY[k])
             result.transforms(stamp, compose(POSES[k], relative(ODOMETRY[k], np.zeros(3))), ODOMETRY[k])
             result.particles(stamp, rng.normal(size=(50, 3)), np.full(50, 0.02))
-            for name in ("kept", "rejected", "unknown"):
+            for name in ("kept", "rejected"):
                 result.points(stamp, name, rng.normal(size=(k, 3)).astype(np.float32), np.ones(k, np.float32))
+                result.filtered(stamp, name, rng.normal(size=(k, 3)).astype(np.float32), np.ones(k, np.float32))
+            result.annotations(stamp, "front", [Drawn("loop", SQUARE, BLUE, BLUE), Drawn("points", SQUARE[:k], BLUE)])
             result.health(stamp, Health.UNCERTAIN, "two hypotheses", {"hit_ratio": 0.9, "ess": 40.0})
             result.error(stamp, 0.1, 0.01)
             result.truth(stamp, POSES[k] + [0.1, 0, 0])
@@ -62,7 +67,9 @@ TOPICS = {
     "/wallkit/particles/cloud": "sensor_msgs/msg/PointCloud2",
     "/wallkit/scan/kept": "sensor_msgs/msg/PointCloud2",
     "/wallkit/scan/rejected": "sensor_msgs/msg/PointCloud2",
-    "/wallkit/scan/unknown": "sensor_msgs/msg/PointCloud2",
+    "/wallkit/filter/kept": "sensor_msgs/msg/PointCloud2",
+    "/wallkit/filter/rejected": "sensor_msgs/msg/PointCloud2",
+    "/wallkit/camera/front/annotations": "foxglove_msgs/msg/ImageAnnotations",
     "/wallkit/map": "nav_msgs/msg/OccupancyGrid",
     "/wallkit/health": "diagnostic_msgs/msg/DiagnosticArray",
     "/wallkit/health/state": "std_msgs/msg/Float64",
@@ -100,6 +107,12 @@ def test_rosbags_reads_every_message_and_its_bytes_are_what_rosbags_writes(resul
         np.testing.assert_allclose([pose.pose.orientation.z, pose.pose.orientation.w], [np.sin(half), np.cos(half)])
     assert len(last["/wallkit/particles"].poses) == 50
     assert last["/wallkit/scan/kept"].width == STEPS - 1
+    loop, points = last["/wallkit/camera/front/annotations"].points
+    assert (loop.type, points.type) == (loop.LINE_LOOP, points.POINTS)
+    # half a pixel: Foxglove's origin is the corner of the first one
+    assert [(p.x, p.y) for p in loop.points] == [(10.5, 20.5), (30.5, 20.5), (30.5, 40.5)]
+    assert len(points.points) == min(STEPS - 1, 3)
+    assert (loop.fill_color.b, loop.fill_color.a, loop.thickness) == (1.0, 0.5, 2.0)
     status = last["/wallkit/health"].status[0]
     assert (status.level, status.message) == (1, "UNCERTAIN: two hypotheses")
     assert {v.key: v.value for v in status.values} == {"hit_ratio": "0.9", "ess": "40"}

@@ -8,6 +8,7 @@ import click
 
 from wallkit.cli import common
 from wallkit.cli.bench_covariance import covariance
+from wallkit.cli.bench_points import bench_filter, polygons
 
 
 @click.group()
@@ -16,6 +17,8 @@ def bench() -> None:
 
 
 bench.add_command(covariance)
+bench.add_command(polygons)
+bench.add_command(bench_filter)
 
 
 def _sizes(_: click.Context, __: click.Parameter, value: str) -> tuple[int, ...]:

@@ -18,6 +18,7 @@ from wallkit.core.types import Float64Array, Int64Array
 
 Int32Array = NDArray[np.int32]
 OUTSIDE = -1
+_BANDS = 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,11 +29,16 @@ class Polygons:
         edges: (5, E) float64: x, y of where each edge begins, x, y of where it ends, and dx / dy (0 where dy is).
         starts: (P + 1,) int64, edges of polygon p are starts[p] ... starts[p + 1] - 1.
         boxes: (P, 4) float64 lowest x, lowest y, highest x, highest y.
+        bands: (P, B + 1) int64: a polygon's box is cut into B bands, and band b's edges are members[bands[p, b]] ...
+            members[bands[p, b + 1] - 1], so that a point asks only the edges that are level with it.
+        members: (M,) int64, edges.
     """
 
     edges: Float64Array
     starts: Int64Array
     boxes: Float64Array
+    bands: Int64Array
+    members: Int64Array
 
     def __len__(self) -> int:
         return len(self.boxes)
@@ -67,7 +73,11 @@ def packed(polygons: Sequence[Sequence[ArrayLike]]) -> Polygons:
         edges[:4] = np.concatenate(pieces, axis=1)
         rise = edges[3] - edges[1]
         edges[4] = (edges[2] - edges[0]) / np.where(rise == 0, np.inf, rise)
-    return Polygons(edges, np.array(starts, dtype=np.int64), np.array(boxes, dtype=np.float64).reshape(-1, 4))
+    firsts, around = np.array(starts, dtype=np.int64), np.array(boxes, dtype=np.float64).reshape(-1, 4)
+    bands = np.zeros((len(around), _BANDS + 1), dtype=np.int64)
+    members = np.empty(_count_bands(edges, firsts, around, bands), dtype=np.int64)
+    _fill_bands(edges, firsts, around, bands, members)
+    return Polygons(edges, firsts, around, bands, members)
 
 
 def crossing_number(points: ArrayLike, polygons: Polygons) -> Int64Array:
@@ -100,6 +110,8 @@ def mask_lookup(points: ArrayLike, polygons: Polygons) -> Int64Array:
         polygons.edges - np.array([*low, *low, 0.0])[:, None],
         polygons.starts,
         polygons.boxes - np.concatenate([low, low]),
+        polygons.bands,
+        polygons.members,
     )
     return looked_up(np.asarray(points, dtype=np.float64).reshape(-1, 2) - low, mask_from(moved, (height, width)))
 
@@ -122,7 +134,7 @@ def looked_up(points: ArrayLike, mask: Int32Array) -> Int64Array:
 def _located(kernel: Any, points: ArrayLike, polygons: Polygons) -> Int64Array:
     at = np.ascontiguousarray(np.asarray(points, dtype=np.float64).reshape(-1, 2))
     found = np.empty(len(at), dtype=np.int64)
-    kernel(at, polygons.edges, polygons.starts, polygons.boxes, found)
+    kernel(at, polygons.edges, polygons.boxes, polygons.bands, polygons.members, found)
     return found
 
 
@@ -130,8 +142,7 @@ def _located(kernel: Any, points: ArrayLike, polygons: Polygons) -> Int64Array:
 
 
 @njit(cache=True, nogil=True)
-def _crossing(points: Any, edges: Any, starts: Any, boxes: Any, found: Any) -> None:
-    """The inner loop has no branch, so that LLVM takes several edges at once."""
+def _crossing(points: Any, edges: Any, boxes: Any, bands: Any, members: Any, found: Any) -> None:
     for k in range(len(points)):
         x, y = points[k, 0], points[k, 1]
         found[k] = -1
@@ -139,7 +150,9 @@ def _crossing(points: Any, edges: Any, starts: Any, boxes: Any, found: Any) -> N
             if not (boxes[p, 0] <= x and x <= boxes[p, 2] and boxes[p, 1] <= y and y <= boxes[p, 3]):
                 continue
             crossed = 0
-            for e in range(starts[p], starts[p + 1]):
+            band = _band_of(y, boxes, p, bands.shape[1] - 1)
+            for m in range(bands[p, band], bands[p, band + 1]):
+                e = members[m]
                 y0 = edges[1, e]
                 spans = (y0 > y) != (edges[3, e] > y)
                 crossed += spans & (x < edges[0, e] + (y - y0) * edges[4, e])
@@ -149,7 +162,7 @@ def _crossing(points: Any, edges: Any, starts: Any, boxes: Any, found: Any) -> N
 
 
 @njit(cache=True, nogil=True)
-def _winding(points: Any, edges: Any, starts: Any, boxes: Any, found: Any) -> None:
+def _winding(points: Any, edges: Any, boxes: Any, bands: Any, members: Any, found: Any) -> None:
     for k in range(len(points)):
         x, y = points[k, 0], points[k, 1]
         found[k] = -1
@@ -157,7 +170,9 @@ def _winding(points: Any, edges: Any, starts: Any, boxes: Any, found: Any) -> No
             if not (boxes[p, 0] <= x and x <= boxes[p, 2] and boxes[p, 1] <= y and y <= boxes[p, 3]):
                 continue
             winds = 0
-            for e in range(starts[p], starts[p + 1]):
+            band = _band_of(y, boxes, p, bands.shape[1] - 1)
+            for m in range(bands[p, band], bands[p, band + 1]):
+                e = members[m]
                 x0, y0, x1, y1 = edges[0, e], edges[1, e], edges[2, e], edges[3, e]
                 left = (x1 - x0) * (y - y0) - (x - x0) * (y1 - y0)
                 winds += (y0 <= y) & (y1 > y) & (left > 0)
@@ -168,7 +183,7 @@ def _winding(points: Any, edges: Any, starts: Any, boxes: Any, found: Any) -> No
 
 
 @njit(cache=True, nogil=True)
-def _even_odd(points: Any, edges: Any, starts: Any, boxes: Any, found: Any) -> None:
+def _even_odd(points: Any, edges: Any, boxes: Any, bands: Any, members: Any, found: Any) -> None:
     for k in range(len(points)):
         x, y = points[k, 0], points[k, 1]
         found[k] = -1
@@ -176,13 +191,55 @@ def _even_odd(points: Any, edges: Any, starts: Any, boxes: Any, found: Any) -> N
             if not (boxes[p, 0] <= x and x <= boxes[p, 2] and boxes[p, 1] <= y and y <= boxes[p, 3]):
                 continue
             is_in = False
-            for e in range(starts[p], starts[p + 1]):
+            band = _band_of(y, boxes, p, bands.shape[1] - 1)
+            for m in range(bands[p, band], bands[p, band + 1]):
+                e = members[m]
                 x0, y0, x1, y1 = edges[0, e], edges[1, e], edges[2, e], edges[3, e]
                 if (y0 > y) != (y1 > y) and x < (x1 - x0) * (y - y0) / (y1 - y0) + x0:
                     is_in = not is_in
             if is_in:
                 found[k] = p
                 break
+
+
+@njit(inline="always")
+def _band_of(y: Any, boxes: Any, p: int, count: int) -> Any:
+    """The band of a polygon's box that a height is in."""
+    tall = boxes[p, 3] - boxes[p, 1]
+    return min(count - 1, max(0, int((y - boxes[p, 1]) / tall * count))) if tall > 0 else 0
+
+
+@njit(cache=True, nogil=True)
+def _count_bands(edges: Any, starts: Any, boxes: Any, bands: Any) -> int:
+    """bands[p, b + 1] = edges of polygon p in its band b; how many there are in all bands."""
+    total, count = 0, bands.shape[1] - 1
+    for p in range(len(boxes)):
+        for e in range(starts[p], starts[p + 1]):
+            low = _band_of(min(edges[1, e], edges[3, e]), boxes, p, count)
+            high = _band_of(max(edges[1, e], edges[3, e]), boxes, p, count)
+            total += high - low + 1
+            for b in range(low, high + 1):
+                bands[p, b + 1] += 1
+    return total
+
+
+@njit(cache=True, nogil=True)
+def _fill_bands(edges: Any, starts: Any, boxes: Any, bands: Any, members: Any) -> None:
+    """From numbers of edges to where they begin, and the edges themselves."""
+    at, count = 0, bands.shape[1] - 1
+    next_free = np.empty(count, np.int64)
+    for p in range(len(boxes)):
+        bands[p, 0] = at
+        for b in range(count):
+            next_free[b] = at
+            at += bands[p, b + 1]
+            bands[p, b + 1] = at
+        for e in range(starts[p], starts[p + 1]):
+            low = _band_of(min(edges[1, e], edges[3, e]), boxes, p, count)
+            high = _band_of(max(edges[1, e], edges[3, e]), boxes, p, count)
+            for b in range(low, high + 1):
+                members[next_free[b]] = e
+                next_free[b] += 1
 
 
 @njit(cache=True, nogil=True)

@@ -47,7 +47,7 @@ def time_updates(
 ) -> Iterator[UpdateTime]:
     """One row per combination, of the likelihood field (as the peers' figures) and of the class-conditional model."""
     for side in cells:
-        fields = _scene(side)
+        fields = bench_scene(side)
         for count in particles:
             for k in beams:
                 scan = _scan(k)
@@ -120,7 +120,7 @@ def _time_one(
     )
 
 
-def _scene(cells: int) -> FieldSet:
+def bench_scene(cells: int) -> FieldSet:
     """A square of rooms, cells of 5 cm: 400 cells are 20 m."""
     import cv2
 

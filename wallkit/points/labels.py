@@ -14,10 +14,14 @@ def labelled_scan(frame: Frame) -> LabelledScan:
     given = frame.labels
     if given is None:
         return LabelledScan(points, weights)
-    known = points.beams < len(given.labels)
-    beams = np.where(known, points.beams, 0)
     if not len(given.labels):
         return LabelledScan(points, weights)
+    known = points.beams < len(given.labels)
+    if known.all():
+        sure = None if given.confidences is None else given.confidences[points.beams].astype(np.float32, copy=False)
+        shares = None if given.shares is None else given.shares[points.beams]
+        return LabelledScan(points, weights, given.labels[points.beams], given.classes, sure, shares)
+    beams = np.where(known, points.beams, 0)
     labels = np.where(known, given.labels[beams], -1)
     confidences = None if given.confidences is None else given.confidences[beams].astype(np.float32)
     shares = None if given.shares is None else np.where(known[:, None], given.shares[beams], np.float32(0.0))

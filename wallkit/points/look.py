@@ -17,9 +17,10 @@ from numba import njit
 
 from wallkit.core.calibration import Calibration
 from wallkit.core.config import setting
-from wallkit.core.geometry import relative
+from wallkit.core.geometry import matrix_from_pose, relative
+from wallkit.core.projection import project_points
 from wallkit.core.types import BoolArray, Float32Array, Float64Array, Frame, Int64Array, View
-from wallkit.points.project import Projection, hidden, moved_to, project
+from wallkit.points.project import Projection, hidden
 
 # 95 % of a planar Gaussian lie within 2.448 sigma: 1 - 2 / 2.448^2 of the weight in the middle keeps the variance
 _MIDDLE = 0.666
@@ -74,19 +75,14 @@ def project_frame(
 
     A point is moved to the image's moment by odometry: it was measured at one time, and moved to the scan's stamp already.
     """
-    motion = relative(view.odometry, frame.odometry)
-    points = frame.points
-    projection = project(calibration, moved_to(points.xyz_m, motion, T_lidar_base), allow_unverified=True)
+    assert calibration.T_camera_lidar is not None  # check_usable
+    T = calibration.T_camera_lidar @ T_lidar_base @ matrix_from_pose(relative(view.odometry, frame.odometry))
+    projection = Projection(*project_points(calibration.camera, T, frame.points.xyz_m))
     is_seen = projection.is_inside
     if frame.cloud_m is not None:
-        cloud = project(calibration, moved_to(frame.cloud_m, motion, T_lidar_base), allow_unverified=True)
-        is_seen = is_seen & ~hidden(
-            projection,
-            cloud,
-            reach_px=settings.hidden_px,
-            margin_m=settings.hidden_m,
-            margin_per_m=settings.hidden_per_m,
-        )
+        cloud = Projection(*project_points(calibration.camera, T, frame.cloud_m))
+        near = {"margin_m": settings.hidden_m, "margin_per_m": settings.hidden_per_m}
+        is_seen = is_seen & ~hidden(projection, cloud, reach_px=settings.hidden_px, **near)
     return projection, is_seen, _margins_px(calibration, frame, view, projection, settings)
 
 
@@ -105,17 +101,12 @@ def look(
     labels, confidences = np.full(total, -1), np.zeros(total, dtype=np.float32)
     shares = np.zeros((total, count), dtype=np.float32)
     if len(seen):
-        middles = projection.pixels[seen]
-        places = middles[None] if not margins[seen].any() else _places(middles, margins[seen])
+        samples = 1 if not margins.any() else 1 + len(_RING)
+        places = np.empty((samples, len(seen), 2))
+        _place(projection.pixels, margins, seen, _RING, places)
         found, sure = classes_at(places.reshape(-1, 2))
-        classes = class_of[found].reshape(len(places), -1)
-        _share_out(classes, sure.reshape(classes.shape), seen, _MIDDLE, labels, confidences, shares)
+        _share_out(found, sure, class_of, seen, samples, _MIDDLE, labels, confidences, shares)
     return Look(projection, is_seen, margins, labels, confidences, shares)
-
-
-def _places(middles: Float64Array, margins: Float64Array) -> Float64Array:
-    """(7, M, 2) the pixels and six around each."""
-    return np.concatenate([middles[None], middles[None] + _RING[:, None] * margins[None, :, None]])
 
 
 def _margins_px(
@@ -123,31 +114,85 @@ def _margins_px(
 ) -> Float64Array:
     """(K,) radius of the circle that holds a point's true pixel with 95 %: calibration, clocks and own motion together."""
     points, count = frame.points, len(projection.depths_m)
+    margins = np.zeros(count)
     if settings.margins == 0 or not count:
-        return np.zeros(count)
-    known = calibration.pixel_error_95_at(points.ranges_m)
-    of_calibration = np.where(np.isfinite(known), known, settings.unknown_error_px)
-    focal, depths = float(calibration.camera.K[0, 0]), np.maximum(projection.depths_m, 0.1)
-    taken_s = points.offsets_s if points.offsets_s is not None else np.zeros(count, dtype=np.float32)
-    apart_s = np.abs(taken_s - (view.moment_ns - frame.stamp_ns) * 1e-9)
-    of_motion = focal * settings.moving_m_s * apart_s / depths
+        return margins
+    table, taken_s = calibration.pixel_error_95, points.offsets_s
+    if table is None:
+        table = np.array([[1.0, settings.unknown_error_px]] * 2)
+        nearest_m = 0.0
+    else:
+        nearest_m = float(table[0, 0])
     sigma_ns = calibration.time_offset_sigma_ns
-    sigma_s = settings.time_sigma_s if sigma_ns is None else sigma_ns * 1e-9
-    of_clock = _TO_95 * sigma_s * focal * (view.turn_rad_s + view.speed_m_s / depths)
-    total = np.sqrt(of_calibration**2 + of_motion**2 + of_clock**2)
-    return np.asarray(np.minimum(settings.margins * total, settings.margin_max_px))
+    clock_s = _TO_95 * (settings.time_sigma_s if sigma_ns is None else sigma_ns * 1e-9)
+    focal = float(calibration.camera.K[0, 0])
+    image_s = (view.moment_ns - frame.stamp_ns) * 1e-9
+    numbers = (focal, image_s, settings.moving_m_s, clock_s * view.turn_rad_s, clock_s * view.speed_m_s, nearest_m,
+               settings.margins, settings.margin_max_px)  # fmt: skip
+    times = taken_s if taken_s is not None else np.zeros(0, dtype=np.float32)
+    _add_up(points.ranges_m, times, projection.depths_m, 1 / table[::-1, 0], table[::-1, 1].copy(), numbers, margins)
+    return margins
 
 
 @njit(cache=True, nogil=True)
-def _share_out(classes: Any, sure: Any, seen: Any, middle: Any, labels: Any, confidences: Any, shares: Any) -> None:
-    """Of classes (S, M), the middles first: shares (K, C) by weight, the largest as label, its mean confidence."""
-    samples, count = classes.shape
+def _add_up(ranges: Any, times: Any, depths: Any, inverse: Any, errors: Any, numbers: Any, margins: Any) -> None:
+    """margins[k] = how far off the pixel of return k may be, see _margins_px; the table is Calibration.pixel_error_95_at."""
+    focal, image_s, moving, turned, driven, nearest, scale, most = numbers
+    last = len(inverse) - 1
+    for k in range(len(margins)):
+        z = max(depths[k], 0.1)
+        at = 1.0 / max(ranges[k], 1e-6)
+        if ranges[k] < nearest:
+            of_calibration = errors[last] * nearest * at
+        else:
+            i = 0
+            while i < last and inverse[i + 1] < at:
+                i += 1
+            if i == last or at <= inverse[i]:
+                of_calibration = errors[i]
+            else:
+                share = (at - inverse[i]) / (inverse[i + 1] - inverse[i])
+                of_calibration = errors[i] + share * (errors[i + 1] - errors[i])
+        taken = times[k] if len(times) else 0.0
+        of_motion = focal * moving * abs(taken - image_s) / z
+        of_clock = focal * (turned + driven / z)
+        margins[k] = min(most, scale * np.sqrt(of_calibration**2 + of_motion**2 + of_clock**2))
+
+
+@njit(cache=True, nogil=True)
+def _place(pixels: Any, margins: Any, seen: Any, ring: Any, places: Any) -> None:
+    """places (S, M, 2): the pixels of the points seen, and round each as many on its circle as `ring` has."""
+    for m in range(len(seen)):
+        k = seen[m]
+        places[0, m, 0], places[0, m, 1] = pixels[k, 0], pixels[k, 1]
+        for s in range(1, len(places)):
+            places[s, m, 0] = pixels[k, 0] + margins[k] * ring[s - 1, 0]
+            places[s, m, 1] = pixels[k, 1] + margins[k] * ring[s - 1, 1]
+
+
+@njit(cache=True, nogil=True)
+def _share_out(
+    found: Any,
+    sure: Any,
+    class_of: Any,
+    seen: Any,
+    samples: int,
+    middle: Any,
+    labels: Any,
+    confidences: Any,
+    shares: Any,
+) -> None:
+    """Of what was found at (S * M) places, the middles first: shares (K, C) by weight, the largest as label, and how sure.
+
+    class_of: from what is found to our classes, its last is for -1.
+    """
+    count = len(seen)
     around = (1.0 - middle) / (samples - 1) if samples > 1 else 0.0
     first = middle if samples > 1 else 1.0
     for m in range(count):
         k, known = seen[m], 0.0
         for s in range(samples):
-            c = classes[s, m]
+            c = class_of[found[s * count + m]]
             if c >= 0:
                 weight = first if s == 0 else around
                 shares[k, c] += weight
@@ -162,8 +207,8 @@ def _share_out(classes: Any, sure: Any, seen: Any, middle: Any, labels: Any, con
         labels[k] = best
         total, weights = 0.0, 0.0
         for s in range(samples):
-            if classes[s, m] == best:
+            if class_of[found[s * count + m]] == best:
                 weight = first if s == 0 else around
-                total += weight * sure[s, m]
+                total += weight * sure[s * count + m]
                 weights += weight
         confidences[k] = total / weights

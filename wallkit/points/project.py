@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wallkit.core.calibration import Calibration
-from wallkit.core.geometry import matrix_from_pose
 from wallkit.core.types import BoolArray, Float64Array
 from wallkit.errors import CalibrationError
 
@@ -62,16 +61,6 @@ def check_usable(calibration: Calibration, *, allow_unverified: bool = False) ->
         hint = "calibrate again, or pass --allow-unverified to use it all the same"
         raise CalibrationError(f"the calibration's verdict is FAIL ({said})", hint=hint)
     return calibration.T_camera_lidar
-
-
-def moved_to(points_m: ArrayLike, motion: Float64Array, T_lidar_base: Float64Array) -> Float64Array:
-    """(K, 3) points of frame base in the LiDAR's frame after the robot has moved.
-
-    Args:
-        motion: (3,) T_base(now)_base(then), the points are of `then`. What stands still is at the same place in both.
-    """
-    T = T_lidar_base @ matrix_from_pose(motion)
-    return np.asarray(np.asarray(points_m, dtype=np.float64) @ T[:3, :3].T + T[:3, 3])
 
 
 def hidden(
