@@ -1,0 +1,190 @@
+"""`wallkit localize --filter` through a camera: what is kept, what is said when it cannot be, and what lies in the folder."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.e2e import camera_log
+from wallkit.core.camera import Camera
+from wallkit.errors import CalibrationError, ConfigError, LogError, ModelError
+from wallkit.logs.reader import open_log
+from wallkit.pipelines.cameras import CameraRequest
+from wallkit.pipelines.config import load_config
+from wallkit.pipelines.localize import Request, localize, prepare
+from wallkit.segment.fixture import USUAL, oracle
+
+ORACLE = {"model": "oracle"}
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory):
+    """A log with people before the walls, its calibration, and a model that knows walls and people by colour."""
+    folder = tmp_path_factory.mktemp("camera")
+    camera_log.write_log(folder / "log.mcap", seconds=9)
+    camera_log.write_calibration(folder / "front.toml")
+    (folder / "colours.onnx").write_bytes(oracle(USUAL, (256, 320), "class-scores"))
+    return folder
+
+
+def prepared(log, filters=("wall_mask",), *, words=(), seeds=1, calibrations=(), **cameras):
+    config = load_config(None, ["localize.particles=300", *words], {"points.filters": (tuple(filters), "--filter")}).config
+    request = Request((log,), init="truth", cameras=CameraRequest(calibrations=calibrations, **cameras))
+    return prepare(request, config, seeds=seeds)
+
+
+def ready(world, filters=("wall_mask",), **given):
+    return prepared(world / "log.mcap", filters, calibrations=(world / "front.toml",), **{**ORACLE, **given})
+
+
+def test_the_command_keeps_walls_and_says_so(wallkit, tmp_path, world):
+    words = ("--filter", "wall_mask", "--calib", world / "front.toml", "--model", "oracle", "--init", "truth")
+    done = wallkit("localize", world / "log.mcap", *words, "--overlay", "2", "-o", "run", "-q", "--particles", "300")
+    assert done.code == 0, done.err
+    said = next(line for line in done.out.splitlines() if line.startswith("filter"))
+    assert "wall_mask:" in said
+    assert "seen by no camera" in said
+    run = json.loads((tmp_path / "run" / "run.json").read_text())
+    classes = run["filtering"]["classes"]
+    assert classes["person"]["returns"] > 100
+    assert classes["person"]["kept"] == 0
+    assert classes["wall"]["kept"] > 0.9 * classes["wall"]["returns"]
+    assert classes["not seen"]["kept"] == classes["not seen"]["returns"]
+    assert run["filtering"]["cameras"][0]["topic"] == "/oracle/front/classes"
+    metrics = json.loads((tmp_path / "run" / "metrics.json").read_text())
+    assert 0 < metrics["kept_share"] < 1
+    assert len(list((tmp_path / "run" / "overlays").glob("*.png"))) == 2
+    page = (tmp_path / "run" / "report.html").read_text()
+    assert page.count("data:image/jpeg;base64,") == 2
+    assert "What the point filters kept" in page
+    result = open_log([tmp_path / "run" / "result.mcap"])
+    topics = {c.topic for c in result.channels}
+    assert {"/wallkit/filter/kept", "/wallkit/filter/rejected", "/wallkit/camera/front/annotations"} <= topics
+    layout = json.loads((tmp_path / "run" / "foxglove-layout.json").read_text())
+    assert layout["configById"]["Image!camera"]["imageMode"]["imageTopic"] == "/camera/front/image/compressed"
+    # drawn again from the folder, with its pictures
+    assert wallkit("report", "run", "-o", "again.html").code == 0
+    assert (tmp_path / "again.html").read_text().count("data:image/jpeg;base64,") == 2
+
+
+@pytest.mark.parametrize("name", ["wall_mask", "reject_dynamic", "soft_mask"])
+def test_no_return_on_a_person_is_kept_and_few_on_walls_are_lost(world, name):
+    run = localize(ready(world, (name,)))
+    counts = run.filtering.by_class
+    assert counts["person"][1] == 0
+    assert counts["wall"][1] > 0.9 * counts["wall"][0]
+    assert run.estimate.health.name == "LOCALIZED"
+
+
+def test_an_onnx_model_sees_what_the_oracle_sees(world):
+    by_oracle = localize(ready(world)).filtering.by_class
+    by_model = localize(ready(world, model=str(world / "colours.onnx"))).filtering
+    assert by_model.by_class["person"][0] == pytest.approx(by_oracle["person"][0], rel=0.15)
+    assert by_model.by_class["wall"][0] == pytest.approx(by_oracle["wall"][0], rel=0.05)
+    assert by_model.by_class["person"][1] == 0
+    assert by_model.segment_ms > 0
+
+
+def test_polygons_keep_what_pixels_keep(world):
+    by_pixel = localize(ready(world)).filtering
+    by_polygon = localize(ready(world, words=("points.look.lookup=crossing_number",))).filtering
+    assert by_polygon.kept == pytest.approx(by_pixel.kept, rel=0.03)
+
+
+def test_later_seeds_look_at_no_image_and_say_what_a_first_one_says(world):
+    both = ready(world, seeds=2)
+    first, second = localize(both), localize(replace(both, request=replace(both.request, seed=1)))
+    alone = localize(replace(ready(world), request=replace(both.request, seed=1)))
+    assert (first.filtering.images > 0, second.filtering.images) == (True, 0)
+    np.testing.assert_array_equal(second.steps.poses, alone.steps.poses)
+    assert second.filtering.by_class == alone.filtering.by_class
+
+
+def test_a_failed_calibration_is_refused_unless_allowed(world, tmp_path):
+    failed = camera_log.write_calibration(tmp_path / "failed.toml", camera_log.failed())
+    with pytest.raises(CalibrationError, match=r"failed.toml: the calibration's verdict is FAIL \(plane: 73 mm off\)"):
+        prepared(world / "log.mcap", calibrations=(failed,), **ORACLE)
+    assert prepared(world / "log.mcap", calibrations=(failed,), allow_unverified=True, **ORACLE).sight is not None
+    other = camera_log.write_calibration(tmp_path / "other.toml", camera_log.calibration(lidar_frame="rear_laser"))
+    with pytest.raises(CalibrationError, match="is of the LiDAR 'rear_laser', the scans are of 'laser'"):
+        prepared(world / "log.mcap", calibrations=(other,), **ORACLE)
+
+
+def test_images_that_are_not_of_the_calibrations_size_are_refused(world, tmp_path):
+    made = camera_log.calibration()
+    K = made.camera.K.copy()
+    large = replace(made, camera=Camera("plumb_bob", 640, 480, K, np.zeros(5), "front", "camera_front"))
+    path = camera_log.write_calibration(tmp_path / "large.toml", large)
+    with pytest.raises(CalibrationError, match="is for images of 640 x 480, those of .* have 320 x 240"):
+        prepared(world / "log.mcap", calibrations=(path,), **ORACLE)
+
+
+def test_a_camera_info_of_another_size_is_refused(world, tmp_path):
+    log = camera_log.write_log(tmp_path / "log.mcap", seconds=0.5, info_size=(640, 480))
+    given = {"calibrations": (world / "front.toml",), **ORACLE}
+    with pytest.raises(CalibrationError, match="camera_info says 640 x 480, the images of .* have 320 x 240"):
+        prepared(log, **given)
+    allowed = prepared(log, allow_unverified=True, **given)
+    assert "camera_info says 640 x 480" in allowed.sight.cameras[0].notes[0]
+
+
+def test_a_log_without_a_camera_is_refused_and_the_lidar_stands_in_when_told(world, tmp_path):
+    log = camera_log.write_log(tmp_path / "log.mcap", seconds=0.5, images=False, oracle=False)
+    model = str(world / "colours.onnx")
+    given = {"calibrations": (world / "front.toml",), "model": model}
+    with pytest.raises(LogError, match="holds no camera images"):
+        prepared(log, **given)
+    with pytest.raises(LogError, match="holds no labels of a simulator"):
+        prepared(log, **given | ORACLE)
+    alone = prepared(log, ("wall_mask", "line_fit"), may_fall_back=True, **given)
+    assert alone.sight is None
+    assert alone.config.points.filters == ("line_fit",)
+    assert "holds no camera images" in alone.fallen_back
+
+
+def test_what_is_missing_is_asked_for(world):
+    with pytest.raises(ConfigError, match="needs to know where LiDAR points land"):
+        prepared(world / "log.mcap", **ORACLE)
+    with pytest.raises(ConfigError, match="needs a model that says what images show"):
+        prepared(world / "log.mcap", calibrations=(world / "front.toml",))
+    with pytest.raises(LogError, match="no camera 'rear'"):
+        ready(world, cameras=("rear",))
+    with pytest.raises(ConfigError, match="2 cameras and 1 calibrations"):
+        ready(world, cameras=("front", "rear"))
+
+
+def test_a_camera_is_found_by_name_or_topic_or_frame(world, tmp_path):
+    topic = "/oracle/front/classes"
+    for words in ((), ("front",), (topic,)):
+        (camera,) = ready(world, cameras=words).sight.cameras
+        assert (camera.topic, camera.picture_topic) == (topic, "/camera/front/image/compressed")
+    made = camera_log.calibration()
+    stranger = replace(made, camera=replace(made.camera, frame="camera_rear", name="rear"))
+    path = camera_log.write_calibration(tmp_path / "rear.toml", stranger)
+    with pytest.raises(CalibrationError, match=r"the camera of this calibration \('rear', frame 'camera_rear'\) is not in"):
+        prepared(world / "log.mcap", calibrations=(path,), **ORACLE)
+
+
+def test_a_model_without_a_wall_is_refused_and_roles_can_be_said(world, tmp_path):
+    path = tmp_path / "people.onnx"
+    path.write_bytes(oracle({"person": USUAL["person"], "brickwork": USUAL["wall"]}, (256, 320), "class-scores"))
+    with pytest.raises(ModelError, match="no class counts as wall or partition") as caught:
+        ready(world, model=str(path))
+    assert "segment.roles.wall" in caught.value.hint
+    assert ready(world, ("reject_dynamic",), model=str(path)).sight is not None
+    assert ready(world, model=str(path), words=('segment.roles.wall=["brickwork"]',)).sight is not None
+
+
+def test_images_of_another_time_and_masks_without_walls_are_said_while_running(world, tmp_path):
+    given = {"calibrations": (world / "front.toml",), **ORACLE}
+    late = camera_log.write_log(tmp_path / "late.mcap", image_shift_ms=50_000)
+    with pytest.raises(LogError, match="none of the first 20 scans has an image within the tolerance"):
+        localize(prepared(late, **given))
+    run = localize(prepared(late, may_fall_back=True, **given))
+    assert run.filtering.without_image == run.filtering.updates > 20
+    bare = camera_log.write_log(tmp_path / "bare.mcap", only_floor=True)
+    with pytest.raises(ModelError, match="finds no wall, partition under any return of the first 20 scans"):
+        localize(prepared(bare, **given))
