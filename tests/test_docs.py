@@ -225,7 +225,7 @@ def test_the_readmes_test_command_installs_what_the_tests_need():
     *_, install, test = readme_command("pytest -q")
     assert (install, test) == ("pip install '.[test]'", "pytest -q")
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert {"pytest", "pytest-xdist", "ezdxf", "mujoco", "hypothesis", "ruff", "mypy"} == {
+    assert {"pytest", "pytest-xdist", "ezdxf", "mujoco", "hypothesis", "onnx", "ruff", "mypy"} == {
         re.split(r"[<>=]", name)[0] for name in project["optional-dependencies"]["test"]
     }
 

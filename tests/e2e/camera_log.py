@@ -99,19 +99,19 @@ def write_log(path: Path, *, seconds=12.0, oracle=True, images=True, info_size=(
             ids[:] = CLASSES.index("floor")
         stamp = then + image_shift_ms * 1_000_000
         if images:
-            messages.append((then, "/camera/front/image/compressed", CameraImage(stamp, "camera_front", "png", picture(ids))))
-            width, height = info_size
-            info = CameraInfo(stamp, "camera_front", width, height, "plumb_bob", np.zeros(5), K, np.eye(3), np.hstack([K, np.zeros((3, 1))]))  # fmt: skip
+            image = CameraImage(stamp, "camera_front", "png", picture(ids))
+            messages.append((then, "/camera/front/image/compressed", image))
+            P = np.hstack([K, np.zeros((3, 1))])
+            info = CameraInfo(stamp, "camera_front", *info_size, "plumb_bob", np.zeros(5), K, np.eye(3), P)
             messages.append((then, "/camera/front/camera_info", info))
         if oracle:
             messages.append((then, "/oracle/front/classes", CameraImage(stamp, "camera_front", "png", png(ids))))
     with McapWriter(path) as file:
-        file.write("/tf_static", (Transform(START_NS, "base_link", "laser", mount, is_static=True),), START_NS, is_latched=True)
+        static = Transform(START_NS, "base_link", "laser", mount, is_static=True)
+        file.write("/tf_static", (static,), START_NS, is_latched=True)
         file.write("/map", occupancy(FLAT, 0.05, inside=INSIDE), START_NS, is_latched=True)
         if oracle:
             file.write("/oracle/names", json.dumps({"classes": CLASSES}), START_NS, is_latched=True)
         for at, topic, value in sorted(messages, key=lambda m: m[0]):
             file.write(topic, value, int(at))
     return path
-
-

@@ -1,4 +1,4 @@
-"""`wallkit localize --filter` through a camera: what is kept, what is said when it cannot be, and what lies in the folder."""
+"""`wallkit localize --filter` through a camera: what is kept, what is said when it cannot be, what the folder holds."""
 
 from __future__ import annotations
 
@@ -31,7 +31,9 @@ def world(tmp_path_factory):
 
 
 def prepared(log, filters=("wall_mask",), *, words=(), seeds=1, calibrations=(), **cameras):
-    config = load_config(None, ["localize.particles=300", *words], {"points.filters": (tuple(filters), "--filter")}).config
+    config = load_config(
+        None, ["localize.particles=300", *words], {"points.filters": (tuple(filters), "--filter")}
+    ).config
     request = Request((log,), init="truth", cameras=CameraRequest(calibrations=calibrations, **cameras))
     return prepare(request, config, seeds=seeds)
 
@@ -118,14 +120,14 @@ def test_images_that_are_not_of_the_calibrations_size_are_refused(world, tmp_pat
     K = made.camera.K.copy()
     large = replace(made, camera=Camera("plumb_bob", 640, 480, K, np.zeros(5), "front", "camera_front"))
     path = camera_log.write_calibration(tmp_path / "large.toml", large)
-    with pytest.raises(CalibrationError, match="is for images of 640 x 480, those of .* have 320 x 240"):
+    with pytest.raises(CalibrationError, match=r"is for images of 640 x 480, those of .* have 320 x 240"):
         prepared(world / "log.mcap", calibrations=(path,), **ORACLE)
 
 
 def test_a_camera_info_of_another_size_is_refused(world, tmp_path):
     log = camera_log.write_log(tmp_path / "log.mcap", seconds=0.5, info_size=(640, 480))
     given = {"calibrations": (world / "front.toml",), **ORACLE}
-    with pytest.raises(CalibrationError, match="camera_info says 640 x 480, the images of .* have 320 x 240"):
+    with pytest.raises(CalibrationError, match=r"camera_info says 640 x 480, the images of .* have 320 x 240"):
         prepared(log, **given)
     allowed = prepared(log, allow_unverified=True, **given)
     assert "camera_info says 640 x 480" in allowed.sight.cameras[0].notes[0]
@@ -164,7 +166,9 @@ def test_a_camera_is_found_by_name_or_topic_or_frame(world, tmp_path):
     made = camera_log.calibration()
     stranger = replace(made, camera=replace(made.camera, frame="camera_rear", name="rear"))
     path = camera_log.write_calibration(tmp_path / "rear.toml", stranger)
-    with pytest.raises(CalibrationError, match=r"the camera of this calibration \('rear', frame 'camera_rear'\) is not in"):
+    with pytest.raises(
+        CalibrationError, match=r"the camera of this calibration \('rear', frame 'camera_rear'\) is not in"
+    ):
         prepared(world / "log.mcap", calibrations=(path,), **ORACLE)
 
 

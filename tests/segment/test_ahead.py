@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from wallkit.core.types import CameraImage, Frame, Points
+from wallkit.core.types import CameraImage, Frame, Points, View
 from wallkit.segment.ahead import LookReport, look_ahead
 from wallkit.segment.class_map import class_map
 
@@ -18,8 +19,12 @@ def frame(stamp_ms: int, image_ms: int | None) -> Frame:
     points = Points(
         stamp_ms * 10**6, np.zeros((0, 3), np.float32), EMPTY, np.zeros(0, np.int64), np.zeros(2), 10.0, EMPTY
     )
-    image = None if image_ms is None else CameraImage(image_ms * 10**6, "camera", "jpeg", b"")
-    return Frame(stamp_ms * 10**6, points, np.zeros(3), image=image)
+    views = () if image_ms is None else (view("/camera", image_ms),)
+    return Frame(stamp_ms * 10**6, points, np.zeros(3), views=views)
+
+
+def view(topic: str, image_ms: int) -> View:
+    return View(topic, CameraImage(image_ms * 10**6, "camera", "jpeg", b""), image_ms * 10**6, np.zeros(3))
 
 
 def answer(image: CameraImage):
@@ -28,7 +33,7 @@ def answer(image: CameraImage):
 
 
 def shown(pairs) -> list[int | None]:
-    return [None if seen is None else int(seen.segmentation.labels()[0, 0]) for _, seen in pairs]
+    return [int(seen[0].segmentation.labels()[0, 0]) if seen else None for _, seen in pairs]
 
 
 def test_every_frame_comes_in_order_with_its_own_image():
@@ -36,7 +41,7 @@ def test_every_frame_comes_in_order_with_its_own_image():
     pairs = list(look_ahead(frames, answer))
     assert [f for f, _ in pairs] == frames
     assert shown(pairs) == [k * 100 + 3 for k in range(8)]
-    assert all(seen.stamp_ns == f.image.stamp_ns for f, seen in pairs)
+    assert all(seen.stamp_ns == f.views[0].image.stamp_ns for f, (seen,) in pairs)
 
 
 def test_the_next_images_are_looked_at_while_a_frame_is_worked_on():
@@ -47,7 +52,7 @@ def test_the_next_images_are_looked_at_while_a_frame_is_worked_on():
         return answer(image)
 
     for k, (_, seen) in enumerate(look_ahead([frame(k * 100, k * 100) for k in range(6)], look, frames_ahead=2)):
-        assert seen is not None
+        assert len(seen) == 1
         assert all(begun[j].wait(timeout=30) for j in range(k, min(k + 3, 6)))
         assert not any(begun[j].is_set() for j in range(k + 3, 6))
 
@@ -113,3 +118,15 @@ def test_leaving_early_ends_the_thread():
     next(walk)
     walk.close()
     assert threading.active_count() == before
+
+
+def test_each_camera_has_its_own_images_and_rate():
+    report, frames = LookReport(), []
+    for k in range(6):
+        both = view("/left", k * 100), view("/right", k // 2 * 200)
+        frames.append(replace(frame(k * 100, None), views=both))
+    found = list(look_ahead(frames, answer, rate_hz=5, report=report))
+    assert [[(s.topic, s.stamp_ns // 10**6) for s in seen] for _, seen in found] == [
+        [*([("/left", k * 100)] if k % 2 == 0 else []), ("/right", k // 2 * 200)] for k in range(6)
+    ]
+    assert report == LookReport(looked=6, by_rate=3)

@@ -17,12 +17,14 @@ from wallkit.core.segmentation import Segmentation
 from wallkit.core.types import CameraImage, Frame
 
 Look = Callable[[CameraImage], Segmentation | None]
+Needed = Callable[[Frame], bool]
 
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What an image of a stamp shows."""
+    """What an image of a topic and stamp shows."""
 
+    topic: str
     stamp_ns: int
     segmentation: Segmentation
 
@@ -59,28 +61,35 @@ def look_ahead(
     look: Look,
     *,
     rate_hz: float = 0.0,
-    is_needed: Callable[[Frame], bool] = lambda _: True,
+    is_needed: Needed = lambda _: True,
     frames_ahead: int = 2,
     report: LookReport | None = None,
-) -> Iterator[tuple[Frame, Seen | None]]:
-    """Each frame with what its image shows; None without an image, and for those that are skipped.
+) -> Iterator[tuple[Frame, tuple[Seen, ...]]]:
+    """Each frame with what its images show, of each camera one; without those that are skipped.
 
     Args:
         look: decodes and segments an image, None when it cannot be decoded; called from one other thread only.
-        rate_hz: images per second of stamps at most; 0: all.
+        rate_hz: images per second of stamps at most, of each camera; 0: all.
         is_needed: asked, in the caller's thread, when a frame is read, which is `frames_ahead` before it is handed out.
         report: filled on the way.
     """
-    state = _Ahead(look, rate_hz, report if report is not None else LookReport())
-    waiting: deque[tuple[Frame, _Job | None]] = deque()
+    report = report if report is not None else LookReport()
+    cameras: dict[str, _Ahead] = {}
+    waiting: deque[tuple[Frame, list[tuple[_Ahead, _Job]]]] = deque()
     with ThreadPoolExecutor(max_workers=1, thread_name_prefix="segment") as pool:
         try:
             for frame in frames:
-                waiting.append((frame, state.job(frame, is_needed, pool)))
+                report.without_image += not frame.views
+                jobs = []
+                for view in frame.views:
+                    camera = cameras.setdefault(view.topic, _Ahead(view.topic, look, rate_hz, report))
+                    job = camera.job(frame, view.image, is_needed, pool)
+                    jobs += [(camera, job)] if job is not None else []
+                waiting.append((frame, jobs))
                 if len(waiting) > frames_ahead:
-                    yield state.done(*waiting.popleft())
+                    yield _done(*waiting.popleft())
             while waiting:
-                yield state.done(*waiting.popleft())
+                yield _done(*waiting.popleft())
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
 
@@ -90,29 +99,30 @@ def look_ahead(
 _Job = tuple[int, "Future[Segmentation | None]"]
 
 
-class _Ahead:
-    """The image looked at last, and when the next one is due."""
+def _done(frame: Frame, jobs: list[tuple[_Ahead, _Job]]) -> tuple[Frame, tuple[Seen, ...]]:
+    """A frame with what was seen, as soon as that is known."""
+    found = [camera.done(job) for camera, job in jobs]
+    return frame, tuple(seen for seen in found if seen is not None)
 
-    def __init__(self, look: Look, rate_hz: float, report: LookReport) -> None:
-        self._look, self._report = look, report
+
+class _Ahead:
+    """The image of one camera that was looked at last, and when the next one is due."""
+
+    def __init__(self, topic: str, look: Look, rate_hz: float, report: LookReport) -> None:
+        self._topic, self._look, self._report = topic, look, report
         self._period_ns = 1e9 / rate_hz if rate_hz > 0 else 0.0
-        self._image: tuple[str, int] | None = None
+        self._image_ns: int | None = None
         self._job: _Job | None = None
         self._interval_ns = 0
         self._due_ns = -math.inf
         self._unreadable_ns: int | None = None
 
-    def job(self, frame: Frame, is_needed: Callable[[Frame], bool], pool: ThreadPoolExecutor) -> _Job | None:
+    def job(self, frame: Frame, image: CameraImage, is_needed: Needed, pool: ThreadPoolExecutor) -> _Job | None:
         """The look at a frame's image, begun now or before; None where there is none."""
-        image = frame.image
-        if image is None:
-            self._report.without_image += 1
-            return None
-        key = image.frame_id, image.stamp_ns
-        is_new = self._image != key
+        is_new = self._image_ns != image.stamp_ns
         if is_new:
-            before = image.stamp_ns if self._image is None else self._image[1]
-            self._image, self._job, self._interval_ns = key, None, max(image.stamp_ns - before, 0)
+            before_ns = image.stamp_ns if self._image_ns is None else self._image_ns
+            self._image_ns, self._job, self._interval_ns = image.stamp_ns, None, max(image.stamp_ns - before_ns, 0)
         if self._job is not None:
             return self._job
         if image.stamp_ns + self._interval_ns / 2 < self._due_ns:
@@ -127,19 +137,17 @@ class _Ahead:
             self._job = image.stamp_ns, pool.submit(self._look, image)
         return self._job
 
-    def done(self, frame: Frame, job: _Job | None) -> tuple[Frame, Seen | None]:
-        """A frame with what was seen, as soon as that is known."""
-        if job is None:
-            return frame, None
+    def done(self, job: _Job) -> Seen | None:
+        """What was seen, as soon as that is known; None where the image cannot be read."""
         stamp_ns, future = job
         found = future.result()
         if found is not None:
-            return frame, Seen(stamp_ns, found)
+            return Seen(self._topic, stamp_ns, found)
         if stamp_ns != self._unreadable_ns:
             self._report.looked -= 1
             self._report.unreadable += 1
             self._unreadable_ns = stamp_ns
-        return frame, None
+        return None
 
     def _set_due(self, stamp_ns: int) -> None:
         """The next moment on the beat of the first image; the image nearest to it is the one."""
