@@ -12,7 +12,7 @@ import pytest
 import wallkit
 
 PACKAGE = Path(wallkit.__file__).parent
-ROOMS = ("logs", "maps", "calib", "segment", "points", "localize", "evaluate", "simulate", "dataset", "report")
+ROOMS = ("logs", "maps", "calib", "segment", "points", "localize", "evaluate", "simulate", "dataset", "train", "report")
 HEAVY = {
     "cv2",
     "onnxruntime",
@@ -26,6 +26,7 @@ HEAVY = {
     "lxml",
     "shapely",
     "mujoco",
+    "torch",
 }
 # third-party modules that may be imported at the top of a file, by floor
 ALLOWED_AT_TOP = {
@@ -35,8 +36,8 @@ ALLOWED_AT_TOP = {
     "pipelines": {"numpy"},
     "cli": {"click"},
 }
-# light libraries that a whole room is about
-OWN_LIBRARIES = {"logs": {"mcap"}}
+# libraries that a whole room is about: light ones, and one that only `model train` imports
+OWN_LIBRARIES = {"logs": {"mcap"}, "train": {"torch"}}
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 

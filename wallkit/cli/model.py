@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import click
 
+from wallkit.cli.model_evaluate import evaluate
 from wallkit.cli.model_fixture import fixture
 from wallkit.cli.model_inspect import inspect
+from wallkit.cli.model_train import train
 
 
 @click.group()
@@ -13,5 +15,5 @@ def model() -> None:
     """Judge, compare, shrink and make the segmentation models that look at the camera's pictures."""
 
 
-for command in (inspect, fixture):
+for command in (inspect, evaluate, train, fixture):
     model.add_command(command)

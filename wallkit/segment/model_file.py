@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from wallkit.errors import ModelError
+from wallkit.segment.default import model_path
 
 Size = tuple[int, int]
 _LONGEST_NAME = 100
@@ -83,13 +84,14 @@ class ModelFile:
 
 
 def open_model(path: Path, *, threads: int = 1, spinning: bool = False) -> ModelFile:
-    """The model in a file, ready to run on the CPU.
+    """The model in a file, ready to run on the CPU; `default` is the one inside the package.
 
     Raises:
         ModelError: it is not there, or onnxruntime cannot load it.
     """
     import onnxruntime
 
+    path = model_path(path)
     if not path.is_file():
         hint = "a checkpoint becomes one with `wallkit model export best.pt`"
         raise ModelError("no such file", where=path, hint=hint)

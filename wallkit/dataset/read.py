@@ -1,0 +1,109 @@
+"""The folder of a training set -> its names, its pictures by split, and what it was made of."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from wallkit.core.types import UInt8Array
+from wallkit.dataset.labels import classes_from_png
+from wallkit.dataset.write import read_rgb
+from wallkit.errors import DatasetError
+
+Pair = tuple[Path, Path]
+
+
+@dataclass(frozen=True)
+class TrainingSet:
+    """What a folder offers.
+
+    Attributes:
+        names: classes in the order of their numbers. pairs: split -> (picture, label PNG), by name.
+        sha256: of its manifest. kind: "simulated", or of what else it is.
+    """
+
+    folder: Path
+    names: tuple[str, ...]
+    pairs: Mapping[str, tuple[Pair, ...]]
+    sha256: str
+    kind: str
+
+    def of(self, split: str) -> tuple[Pair, ...]:
+        """The pictures of train, val, or all.
+
+        Raises:
+            DatasetError: there are none.
+        """
+        splits = self.pairs if split == "all" else (split,)
+        found = tuple(pair for one in splits for pair in self.pairs[one])
+        if not found:
+            has = ", ".join(f"{name} {len(pairs)}" for name, pairs in self.pairs.items())
+            raise DatasetError(
+                f"no labelled pictures in its '{split}' part ({has})",
+                where=self.folder,
+                hint="--split all, or make the set with --val 0.2 and more scenes",
+            )
+        return found
+
+
+def read_training_set(folder: Path) -> TrainingSet:
+    """What `wallkit simulate dataset` and `wallkit dataset from-log` write.
+
+    Raises:
+        DatasetError: no such folder, no data.yaml in it, no names, or no label PNGs.
+    """
+    if not (folder / "data.yaml").is_file():
+        what = "no data.yaml in this folder" if folder.is_dir() else "no such folder"
+        raise DatasetError(what, where=folder, hint="make a training set: wallkit simulate dataset -o rooms")
+    manifest = folder / "manifest.json"
+    record = json.loads(manifest.read_text("utf-8")) if manifest.is_file() else {}
+    pairs = {split: _pairs(folder, split) for split in ("train", "val")}
+    if not any(pairs.values()):
+        raise DatasetError(
+            "none of its pictures has a label PNG beside it, in masks/",
+            where=folder,
+            hint="logs bring labels only when they are simulated; make a set: wallkit simulate dataset -o rooms",
+        )
+    digest = hashlib.sha256(manifest.read_bytes()).hexdigest() if manifest.is_file() else ""
+    return TrainingSet(folder, _names(folder / "data.yaml"), pairs, digest, str(record.get("kind", "unknown")))
+
+
+def read_pair(pair: Pair, classes: int) -> tuple[UInt8Array, UInt8Array]:
+    """(H, W, 3) RGB and (H, W) numbers of a picture.
+
+    Raises:
+        DatasetError: sizes that differ, or a number that is no class.
+    """
+    image, numbers = read_rgb(pair[0]), classes_from_png(pair[1].read_bytes())
+    if image.shape[:2] != numbers.shape:
+        sizes = f"{numbers.shape[1]} x {numbers.shape[0]}, its picture {image.shape[1]} x {image.shape[0]}"
+        raise DatasetError(f"labels of {sizes}", where=pair[1], hint="make the set again")
+    beyond = numbers[(numbers >= classes) & (numbers < 255)]
+    if beyond.size:
+        raise DatasetError(f"number {beyond[0]} is none of {classes} classes", where=pair[1], hint="make the set again")
+    return image, numbers
+
+
+def _pairs(folder: Path, split: str) -> tuple[Pair, ...]:
+    pictures = sorted((folder / "images" / split).glob("*.jpg"))
+    pairs = ((picture, folder / "masks" / split / f"{picture.stem}.png") for picture in pictures)
+    return tuple(pair for pair in pairs if pair[1].is_file())
+
+
+def _names(path: Path) -> tuple[str, ...]:
+    """Of the `names:` of a data.yaml, as a list or by number."""
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    try:
+        names = YAML(typ="safe").load(path.read_text("utf-8")).get("names")
+    except (YAMLError, AttributeError) as error:
+        raise DatasetError("this is no data.yaml", where=path, hint="make the set again") from error
+    if isinstance(names, dict) and sorted(names) == list(range(len(names))):
+        names = [names[number] for number in range(len(names))]
+    if not isinstance(names, list) or not names:
+        raise DatasetError(f"names is {names!r}", where=path, hint="names: one line per class, numbered from 0")
+    return tuple(str(name) for name in names)

@@ -1,0 +1,108 @@
+"""A training set -> a YOLO-seg model and its curves, by an interpreter that has Ultralytics."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from wallkit.dataset.read import TrainingSet, read_training_set
+from wallkit.errors import ModelError
+from wallkit.pipelines.outputs import check_out, result_folder
+from wallkit.pipelines.run_folder import sha256, write_json
+from wallkit.train.curves import Epoch, csv_of, draw_curves
+from wallkit.train.yolo import SETUP, YoloLesson, epochs_of, train_yolo
+
+# what YOLO's grids need of a picture's sides
+_MULTIPLE = 32
+
+
+@dataclass(frozen=True)
+class YoloRequest:
+    """What to train on, with which interpreter and from which start; None takes the default of `YoloLesson`."""
+
+    datasets: tuple[Path, ...]
+    python: str
+    start: str
+    size: tuple[int, int] = (320, 256)
+    epochs: int | None = None
+    batch: int | None = None
+    threads: int = 1
+    seed: int = 0
+
+    @property
+    def lesson(self) -> YoloLesson:
+        """As the child is asked; sides rounded up to what YOLO takes."""
+        width, height = (-(-side // _MULTIPLE) * _MULTIPLE for side in self.size)
+        usual = YoloLesson()
+        epochs, batch = self.epochs or usual.epochs, self.batch or usual.batch
+        return YoloLesson(self.start, epochs, batch, (width, height), self.threads, self.seed)
+
+
+@dataclass(frozen=True)
+class YoloTrained:
+    """model: the ONNX file; the checkpoint lies beside it as .pt."""
+
+    model: Path
+    epochs: tuple[Epoch, ...]
+
+
+def train_yolo_model(
+    request: YoloRequest, out: Path, *, overwrite: bool = False, told: Callable[[str], None] = lambda _: None
+) -> YoloTrained:
+    """A folder with model.onnx, model.pt, curves.csv, curves.png and run.json.
+
+    Raises:
+        OutputError, DatasetError: see check_yolo. ModelError: the child cannot train.
+    """
+    found = check_yolo(request, out, overwrite=overwrite)
+    with result_folder(out, overwrite=overwrite) as folder:
+        checkpoint, onnx = train_yolo(request.python, _data(found, folder), folder, request.lesson, told=told)
+        results = (folder / "train" / "results.csv").read_text("utf-8")
+        shutil.copy(onnx, folder / "model.onnx")
+        shutil.copy(checkpoint, folder / "model.pt")
+        epochs = epochs_of(results)
+        (folder / "curves.csv").write_text(csv_of(epochs), encoding="utf-8")
+        draw_curves(epochs, folder / "curves.png", title=f"{request.start} on {found.folder.name}")
+        (folder / "data.yaml").unlink()
+        shutil.rmtree(folder / "train")
+        record = {
+            "schema": 1,
+            "command": "model train",
+            "licence": "AGPL-3.0",
+            "start": request.start,
+            "dataset": {"folder": found.folder.name, "manifest_sha256": found.sha256},
+            "sha256": sha256(folder / "model.onnx"),
+        }
+        write_json(folder / "run.json", record)
+    return YoloTrained(out / "model.onnx", epochs)
+
+
+def check_yolo(request: YoloRequest, out: Path, *, overwrite: bool) -> TrainingSet:
+    """The training set; refuses what cannot be done before anything is.
+
+    Raises:
+        OutputError: `out` cannot be used. DatasetError: the set cannot be read. ModelError: no interpreter, or several sets.
+    """
+    check_out(out, overwrite=overwrite)
+    if len(request.datasets) != 1:
+        raise ModelError(
+            f"{len(request.datasets)} training sets, YOLO takes one", hint="make one set with more pictures"
+        )
+    if not request.python or shutil.which(request.python) is None:
+        said = f"'{request.python}' is no interpreter" if request.python else "which interpreter has Ultralytics?"
+        raise ModelError(said, where="--python", hint="set one up, then pass --python yv/bin/python:\n" + SETUP)
+    found = read_training_set(request.datasets[0])
+    for split in ("train", "val"):
+        found.of(split)
+    return found
+
+
+def _data(found: TrainingSet, folder: Path) -> Path:
+    """A data.yaml with whole paths: Ultralytics takes relative ones from a folder of its own."""
+    names = "\n".join(f"  {number}: {name}" for number, name in enumerate(found.names))
+    path = folder / "data.yaml"
+    text = f"path: {found.folder.absolute()}\ntrain: images/train\nval: images/val\nnames:\n{names}\n"
+    path.write_text(text, encoding="utf-8")
+    return path

@@ -1,0 +1,1 @@
+"""Labelled pictures -> wallkit's own semantic network, by PyTorch, and how well it does."""
