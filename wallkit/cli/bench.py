@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from wallkit.cli import common
+from wallkit.cli.bench_boards import boards
 from wallkit.cli.bench_covariance import covariance
 from wallkit.cli.bench_points import bench_filter, polygons
 
@@ -16,6 +17,7 @@ def bench() -> None:
     """Measure speed and honesty; results belong in docs/benchmarks with the command that made them."""
 
 
+bench.add_command(boards)
 bench.add_command(covariance)
 bench.add_command(polygons)
 bench.add_command(bench_filter)

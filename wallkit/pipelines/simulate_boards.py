@@ -19,7 +19,7 @@ from wallkit.calib.sheet import black_rectangles
 from wallkit.calib.store import toml_from_calibration
 from wallkit.core.calibration import Calibration, Provenance
 from wallkit.core.config import table_from
-from wallkit.core.types import CameraImage, Float64Array, Scan, Transform, UInt8Array
+from wallkit.core.types import CameraImage, Float64Array, PointCloud, Scan, Transform, UInt8Array
 from wallkit.logs.writer import McapWriter
 from wallkit.pipelines.outputs import result_folder
 from wallkit.pipelines.run_folder import write_json
@@ -32,7 +32,7 @@ from wallkit.simulate.camera import Unit, photograph
 from wallkit.simulate.gl import backend
 from wallkit.simulate.looks import Surface, Wardrobe
 from wallkit.simulate.robot import DEFAULT_ROBOT, Robot, robot_from_urdf
-from wallkit.simulate.scanner import sweep
+from wallkit.simulate.scanner import Rings, cloud, sweep
 from wallkit.simulate.scenario import CameraSetup, LidarSetup, Scenario
 from wallkit.simulate.scene import Scene
 from wallkit.simulate.studio import Studio
@@ -49,22 +49,23 @@ _PAPER, _INK = 235, 18
 
 @dataclass(frozen=True)
 class BoardRequest:
-    """What to show to whom: the first camera and the LiDAR of a scenario."""
+    """What to show to whom: the first camera and the LiDAR of a scenario, which is a 3-D one if it has rings."""
 
     board: Board
     scenario: Scenario = field(default_factory=Scenario)
     poses: BoardPoses = field(default_factory=BoardPoses)
+    rings: Rings | None = None
     robot_path: Path = DEFAULT_ROBOT
     seed: int = 0
 
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """One pose of the board: its picture without JPEG, its scan, and where it truly is, T_camera_board (4, 4)."""
+    """One pose of the board: its picture without JPEG, its scan or cloud, and where it truly is, T_camera_board (4, 4)."""
 
     stamp_ns: int
     image: UInt8Array
-    scan: Scan
+    scan: Scan | PointCloud
     T_camera_board: Float64Array
 
 
@@ -100,8 +101,8 @@ def simulate_boards(
     return kept
 
 
-def captures(request: BoardRequest, robot: Robot, unit: Unit) -> Iterator[Held]:
-    """Every picture with its scan: some of each pose, half a second apart.
+def captures(request: BoardRequest, robot: Robot, unit: Unit, *, each: int = _HELD_NS // _EVERY_NS) -> Iterator[Held]:
+    """Every picture with its scan: so many of each pose, half a second apart.
 
     Raises:
         SimulationError: no pose fits, or no OpenGL works.
@@ -116,7 +117,8 @@ def captures(request: BoardRequest, robot: Robot, unit: Unit) -> Iterator[Held]:
     wardrobe = Wardrobe(world, request.scenario.looks, request.seed, own={look: printed})
     T_map_base = upright(-1.5, 0.0, 0.0)
     T_lidar = T_map_base @ robot.frames[robot.lidar_frame(setup.frame)] @ _leaning(setup)
-    held = held_boards(rngs["poses"], request.poses, plate, unit, T_map_base, np.linalg.inv(T_map_base) @ T_lidar)
+    T_base_lidar = np.linalg.inv(T_map_base) @ T_lidar
+    held = held_boards(rngs["poses"], request.poses, plate, unit, T_map_base, T_base_lidar, rings=request.rings)
     T_map_optical = T_map_base @ unit.T_base_true
     T_board_body = np.eye(4)
     T_board_body[:3, 3] = plate.mean(axis=0)
@@ -126,14 +128,20 @@ def captures(request: BoardRequest, robot: Robot, unit: Unit) -> Iterator[Held]:
             bodies = {BOARD: T_map_board @ T_board_body, STAND: stand_under(T_map_board, plate)}
             scene.place(bodies)
             studio.place(bodies)
-            for k in range(_HELD_NS // _EVERY_NS):
+            for k in range(each):
                 stamp_ns = START_NS + number * _HELD_NS + k * _EVERY_NS
-                done = sweep(
-                    rngs["lidar"], setup.scanner, scene, stamp_ns, lambda _: T_lidar,
-                    frame_id=robot.lidar_frame(setup.frame),
-                )  # fmt: skip
+                scan = _scan(rngs["lidar"], request, scene, stamp_ns, T_lidar, robot.lidar_frame(setup.frame))
                 image = photograph(rngs["camera"], studio, unit, [T_map_optical])
-                yield Held(stamp_ns, image, done.scan, np.linalg.inv(T_map_optical) @ T_map_board)
+                yield Held(stamp_ns, image, scan, np.linalg.inv(T_map_optical) @ T_map_board)
+
+
+def _scan(
+    rng: np.random.Generator, request: BoardRequest, scene: Scene, stamp_ns: int, T: Float64Array, frame: str
+) -> Scan | PointCloud:
+    scanner = request.scenario.lidar.scanner
+    if request.rings is not None:
+        return cloud(rng, scanner, request.rings, scene, stamp_ns, T, frame_id=frame)
+    return sweep(rng, scanner, scene, stamp_ns, lambda _: T, frame_id=frame).scan
 
 
 def board_picture(board: Board) -> Texture:
@@ -191,13 +199,30 @@ def _record(file: McapWriter, unit: Unit, held: Held) -> None:
     image = CameraImage(stamp_ns, unit.frame, "png", _png(held.image))
     file.write(f"{topic}/image/compressed", image, stamp_ns)
     file.write(f"{topic}/camera_info", camera_info(unit.published, stamp_ns), stamp_ns)
-    file.write("/scan", held.scan, stamp_ns)
+    file.write("/points" if isinstance(held.scan, PointCloud) else "/scan", held.scan, stamp_ns)
 
 
 def _keep(folder: Path, number: int, held: Held) -> None:
     (folder / "images" / f"pose{number:03d}.png").write_bytes(_png(held.image))
-    scan = held.scan
-    np.savez(folder / "scans" / f"pose{number:03d}.npz", ranges=scan.ranges_m, angles=scan.angles_rad)
+    scan, path = held.scan, folder / "scans" / f"pose{number:03d}"
+    if isinstance(scan, PointCloud):
+        path.with_suffix(".pcd").write_bytes(pcd_from_cloud(scan))
+    else:
+        np.savez(path.with_suffix(".npz"), ranges=scan.ranges_m, angles=scan.angles_rad)
+
+
+def pcd_from_cloud(scan: PointCloud) -> bytes:
+    """A binary PCD 0.7 of x, y, z [m] and ring."""
+    count = len(scan.points_m)
+    table = np.zeros(count, dtype=[("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("ring", "<u2")])
+    for axis, name in enumerate("xyz"):
+        table[name] = scan.points_m[:, axis]
+    table["ring"] = scan.rings
+    head = (
+        "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z ring\nSIZE 4 4 4 2\nTYPE F F F U\nCOUNT 1 1 1 1\n"
+        f"WIDTH {count}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {count}\nDATA binary\n"
+    )
+    return head.encode("ascii") + table.tobytes()
 
 
 def _png(image: UInt8Array) -> bytes:
@@ -224,6 +249,7 @@ def _manifest(request: BoardRequest, kept: list[Held]) -> dict[str, object]:
         "seed": request.seed,
         "board": request.board.words,
         "poses": table_from(request.poses),
+        "rings": table_from(request.rings) if request.rings is not None else None,
         "scenario": table_from(request.scenario),
         "T_camera_board": [held.T_camera_board.tolist() for held in kept],
     }

@@ -10,11 +10,15 @@ from wallkit.core.config import setting
 from wallkit.core.types import Float64Array
 from wallkit.errors import SimulationError
 from wallkit.simulate.camera import Unit
+from wallkit.simulate.scanner import Rings
 from wallkit.simulate.world import MAP, Body, Solid, World, upright
 
 BOARD, STAND = "board", "stand"
 _THICK_M = 0.008
 _TRIES = 1500
+_FEWEST_RINGS = 4
+# the post is so far behind the plate that nobody takes them for one thing
+_BEHIND_M = 0.35
 _ROOM_M, _HEIGHT_M = 8.0, 2.8
 
 
@@ -70,11 +74,14 @@ def held_boards(
     unit: Unit,
     T_map_base: Float64Array,
     T_base_lidar: Float64Array,
+    *,
+    rings: Rings | None = None,
 ) -> tuple[Float64Array, ...]:
     """T_map_board (4, 4) of every pose.
 
     Args:
         plate: (4, 3) corners in the board's frame, z = 0.
+        rings: of a 3-D LiDAR, of which four must meet the plate; None: of a planar one, whose plane must cut it.
 
     Raises:
         SimulationError: no pose is found that the camera sees whole and the LiDAR cuts.
@@ -85,8 +92,10 @@ def held_boards(
     found: list[Float64Array] = []
     for _ in range(_TRIES * poses.count):
         T_optical_board = _held(rng, poses, unit, middle)
+        T_lidar_board = T_lidar_map @ T_map_optical @ T_optical_board
         if _is_seen(T_optical_board, plate, unit, poses.margin_px) and (
-            poses.anywhere or _is_cut(T_lidar_map @ T_map_optical @ T_optical_board, plate, poses.cut)
+            poses.anywhere
+            or (_is_cut(T_lidar_board, plate, poses.cut) if rings is None else _is_swept(T_lidar_board, plate, rings))
         ):
             T_map_board = T_map_optical @ T_optical_board
             heights = (plate @ T_map_board[:3, :3].T + T_map_board[:3, 3])[:, 2]
@@ -105,7 +114,7 @@ def stand_under(T_map_board: Float64Array, plate: Float64Array) -> Float64Array:
     corners = plate @ T_map_board[:3, :3].T + T_map_board[:3, 3]
     middle = corners.mean(axis=0)
     away = T_map_board[:2, 2] / max(float(np.hypot(*T_map_board[:2, 2])), 1e-9)
-    depth = float(((corners - middle)[:, :2] @ away).max()) + 0.08
+    depth = float(((corners - middle)[:, :2] @ away).max()) + _BEHIND_M
     x, y = middle[:2] + depth * away
     return upright(float(x), float(y), 0.0, float(middle[2]))
 
@@ -149,3 +158,11 @@ def _is_cut(T_lidar_board: Float64Array, plate: Float64Array, share: float) -> b
         return False
     longest = float(np.linalg.norm(plate[0] - plate[1:], axis=1)[[0, 2]].max())
     return float(np.linalg.norm(crossings[0] - crossings[1])) >= share * longest
+
+
+def _is_swept(T_lidar_board: Float64Array, plate: Float64Array, rings: Rings) -> bool:
+    """Whether four rings of a 3-D LiDAR meet the plate, or look past its corners."""
+    corners = plate @ T_lidar_board[:3, :3].T + T_lidar_board[:3, 3]
+    elevations = np.arctan2(corners[:, 2], np.hypot(corners[:, 0], corners[:, 1]))
+    inside = (rings.elevations_rad > elevations.min()) & (rings.elevations_rad < elevations.max())
+    return bool(inside.sum() >= _FEWEST_RINGS)

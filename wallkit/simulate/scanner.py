@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wallkit.core.config import setting
-from wallkit.core.types import Float64Array, Int64Array, Scan
+from wallkit.core.types import Float64Array, Int64Array, PointCloud, Scan
 from wallkit.simulate.scene import NOTHING, Hits, Scene
 
 PoseAt = Callable[[int], Float64Array]
@@ -53,6 +53,19 @@ class Scanner:
     def beam_interval_s(self) -> float:
         """Time between two beams: the mirror also turns where it does not look."""
         return 0.0 if self.is_instant else self.fov_rad / (2 * np.pi) / self.rate_hz / self.beams
+
+
+@dataclass(frozen=True)
+class Rings:
+    """What makes a planar LiDAR a 3-D one: the same beams in several rings, evenly spread up and down."""
+
+    count: int = setting(16, "rings", low=2, high=256)
+    span_rad: float = setting(0.5236, "from the lowest ring to the highest", low=0.01, high=3.0)
+
+    @property
+    def elevations_rad(self) -> Float64Array:
+        """(R,) above the LiDAR's x-y plane, the lowest first."""
+        return np.linspace(-self.span_rad / 2, self.span_rad / 2, self.count)
 
 
 def perfect(scanner: Scanner) -> Scanner:
@@ -116,18 +129,47 @@ def sweep(
     return Sweep(scan, np.where(np.isfinite(measured), solids, NOTHING))
 
 
+def cloud(
+    rng: np.random.Generator,
+    scanner: Scanner,
+    rings: Rings,
+    scene: Scene,
+    stamp_ns: int,
+    T_map_lidar: Float64Array,
+    *,
+    frame_id: str = "lidar",
+) -> PointCloud:
+    """The returns of a 3-D LiDAR that stands still while nothing moves, ring after ring."""
+    bearings = scanner.bearings_rad
+    points, numbers = [], []
+    for ring, elevation in enumerate(rings.elevations_rad.tolist()):
+        ranges, _, cosines = _spots(rng, scanner, scene, T_map_lidar, bearings, elevation)
+        measured = _measured(rng, scanner, ranges, cosines)
+        kept = np.isfinite(measured)
+        points.append(measured[kept, None] * _directions(bearings[kept], elevation))
+        numbers.append(np.full(int(kept.sum()), ring, dtype=np.int64))
+    return PointCloud(stamp_ns, frame_id, np.concatenate(points).astype(np.float32), rings=np.concatenate(numbers))
+
+
 # -------------------------------------------------------------------------------------------- light
 
 
 def _spots(
-    rng: np.random.Generator, scanner: Scanner, scene: Scene, T_map_lidar: Float64Array, bearings: Float64Array
+    rng: np.random.Generator,
+    scanner: Scanner,
+    scene: Scene,
+    T_map_lidar: Float64Array,
+    bearings: Float64Array,
+    elevation_rad: float = 0.0,
 ) -> tuple[Float64Array, Int64Array, Float64Array]:
     """(range, solid, cosine of incidence) of beams that are as wide as they are."""
-    ranges, solids, cosines = _echoes(rng, scanner, scene, T_map_lidar, bearings)
+    ranges, solids, cosines = _echoes(rng, scanner, scene, T_map_lidar, _directions(bearings, elevation_rad))
     if scanner.divergence_rad == 0:
         return ranges, solids, cosines
     edges = [
-        _echoes(rng, scanner, scene, T_map_lidar, bearings + side * scanner.divergence_rad / 2)[0]
+        _echoes(
+            rng, scanner, scene, T_map_lidar, _directions(bearings + side * scanner.divergence_rad / 2, elevation_rad)
+        )[0]
         for side in (-1.0, 1.0)
     ]
     both = np.stack([ranges, *edges])
@@ -141,12 +183,20 @@ def _spots(
     return between, np.where(is_mixed, NOTHING, solids), cosines
 
 
+def _directions(bearings: Float64Array, elevation_rad: float) -> Float64Array:
+    """(K, 3) unit, in the LiDAR's frame."""
+    flat = np.cos(elevation_rad)
+    return np.column_stack(
+        [flat * np.cos(bearings), flat * np.sin(bearings), np.full(len(bearings), np.sin(elevation_rad))]
+    )
+
+
 def _echoes(
-    rng: np.random.Generator, scanner: Scanner, scene: Scene, T_map_lidar: Float64Array, bearings: Float64Array
+    rng: np.random.Generator, scanner: Scanner, scene: Scene, T_map_lidar: Float64Array, directions: Float64Array
 ) -> tuple[Float64Array, Int64Array, Float64Array]:
-    """(range, solid, cosine) of thin beams: through glass that does not answer, and by mirrors."""
+    """(range, solid, cosine) of thin beams (K, 3): through glass that does not answer, and by mirrors."""
     R, origin = T_map_lidar[:3, :3], T_map_lidar[:3, 3]
-    directions = np.column_stack([np.cos(bearings), np.sin(bearings), np.zeros(len(bearings))]) @ R.T
+    directions = directions @ R.T
     hits = scene.cast(origin, directions)
     lights = scene.lights[hits.solids]
     if (lights == "glass").any():
