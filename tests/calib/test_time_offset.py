@@ -8,7 +8,7 @@ import pytest
 from wallkit.calib.coarse_offset import coarse_offset, traces_at
 from wallkit.calib.time_offset import BoardTrack, TimedTrace, poses_at, time_offset
 from wallkit.calib.worlds import UPRIGHT, World, board_at, hits
-from wallkit.core.types import Scan
+from wallkit.core.types import PointCloud, Scan
 
 PLATE = np.array([[-0.4, -0.3, 0], [0.4, -0.3, 0], [0.4, 0.3, 0], [-0.4, 0.3, 0]])
 T = np.eye(4)
@@ -92,6 +92,34 @@ def test_poses_between_images():
     np.testing.assert_allclose(velocity[0, 3:], speed, atol=5e-3)
     gappy = BoardTrack(track.stamps_ns[::5], track.poses[::5])
     assert np.isnan(poses_at(gappy, between)[0]).all()
+
+
+def recorded_clouds(tau_s, *, has_times, seconds=12.0):
+    """Clouds of 16 rings that take 100 ms a turn, from behind the robot to the left and round."""
+    track, _ = recorded(tau_s, seconds=seconds)
+    rng = np.random.default_rng(2)
+    world, clouds = World(is_planar=False, beam_deg=1.0), []
+    wall = np.column_stack([np.full(400, 4.0), np.linspace(-3, 3, 400), np.tile(np.linspace(-1, 1, 20), 20)])
+    for begin in range(200_000_000, int(seconds * 1e9) - 300_000_000, SCAN_NS):
+        # the board is ahead, half a turn after the stamp
+        points = np.concatenate([hits(world, T, waved(begin / 1e9 + 0.05), rng), wall])
+        after = (np.arctan2(points[:, 1], points[:, 0]) + np.pi) / (2 * np.pi) * 0.1
+        offsets = after.astype(np.float32) if has_times else None
+        clouds.append(PointCloud(begin, "lidar", points.astype(np.float32), offsets_s=offsets))
+    return track, clouds
+
+
+@pytest.mark.parametrize(("tau_ms", "has_times"), [(-30.0, True), (300.0, True), (20.0, False)])
+def test_offsets_of_clouds(tau_ms, has_times):
+    """With times of the returns the offset is that of the clocks; without them half a turn of the LiDAR is in it."""
+    track, clouds = recorded_clouds(tau_ms / 1e3, has_times=has_times)
+    coarse = coarse_offset(track, clouds, T, PLATE, sigma_range_m=0.01)
+    traces = traces_at(track, clouds, T, PLATE, coarse, sigma_range_m=0.01)
+    found = time_offset(track, traces, T, sigma_range_m=0.01, start_s=coarse)
+    expected = tau_ms + (0 if has_times else 50)
+    assert found.verdict == "known"
+    assert found.sigma_s < 0.003
+    assert abs(found.tau_s * 1e3 - expected) < 3.5 * found.sigma_s * 1e3 + 1.0
 
 
 @pytest.mark.parametrize("tau_ms", [30.0, 150.0, -400.0])

@@ -328,6 +328,32 @@ def test_the_stored_pixel_error_is_the_one_that_verify_finds(planar, count):
     assert (normal.pixel_error[:, 1] < 0.95 * alone.pixel_error[:, 1]).all()
 
 
+@pytest.mark.parametrize("axis", range(6))
+def test_what_moves_during_the_recording_is_named(axis):
+    """The LiDAR is bumped by 1 deg or 4 cm between two views: the halves disagree, and the axis is named."""
+    rng = np.random.default_rng(6)
+    T = mounting(rng)
+    bumped = moved(T, axis, np.radians(1.0) if axis < 3 else 0.04)
+    sightings = (*draw_sightings(rng, SHARP, T, 15), *draw_sightings(rng, SHARP, bumped, 15))
+    sightings = tuple(replace(s, name=f"v{i}") for i, s in enumerate(sightings))
+    start = evidence_of(Calibration(CAMERA), sigma_range_m=0.004, sigma_source="declared", urdf=None)
+    found = gate("halves", with_sightings(start, sightings, solve(sightings), is_own=False))
+    assert found.verdict == "FAIL"
+    assert DEGREES_OF_FREEDOM[axis] in found.reason
+
+
+def test_halves_of_a_good_recording_agree(good):
+    assert gate("halves", good).verdict == "PASS"
+    assert gate("halves", judged_world(2, 15)).verdict == ""
+
+
+@pytest.mark.parametrize(("judged_px", "verdict"), [(0.14, "PASS"), (0.16, "CANNOT TELL"), (9.0, "CANNOT TELL")])
+def test_a_lens_that_a_refit_beats(judged_px, verdict):
+    found = gate("refit", Evidence(Calibration(CAMERA), refit=(judged_px, 0.1)))
+    assert found.verdict == verdict
+    assert verdict == "PASS" or f"this one {judged_px:.2f} px" in found.reason
+
+
 def test_held_out_is_worse_than_the_fit_and_other_files_are_held_out_anyway(good):
     def total(views):
         return sum(v.rms_mm**2 * v.points for v in views)

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wallkit.calib.scan_board import Trace
 from wallkit.calib.sightings import BoardPose, Face
-from wallkit.core.types import BoolArray, Float64Array, Int64Array
+from wallkit.core.types import BoolArray, Float64Array, Int64Array, PointCloud
 
 FEWEST = 30
 PLANE_M = 0.03
@@ -19,6 +20,8 @@ SIDE_SIGMA_M = 0.03
 _TRIALS = 300
 _CLUSTER_M = 0.16
 _SMALLEST_SHARE = 0.4
+# more returns of one sweep say nothing more about a clock
+_MOST = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +72,28 @@ def find_patch(
         if fits and misfit < closest:
             best, closest = Patch(points[kept], None if rings is None else rings[kept], rms, size), misfit
     return best
+
+
+def returns_on_plate(cloud: PointCloud, board: BoardPose, plate: Float64Array, T: Float64Array) -> Trace:
+    """The returns well within the plate and near its plane, a hundred of them at most, with their times after the stamp.
+
+    Args:
+        plate: (4, 3) corners of the plate in the board frame. T: (4, 4) T_camera_lidar.
+    """
+    to_board = np.linalg.inv(board.T_camera_board) @ T
+    with np.errstate(invalid="ignore"):
+        seen = cloud.points_m.astype(np.float64) @ to_board[:3, :3].T + to_board[:3, 3]
+        low, high = plate[:, :2].min(axis=0) + SIDE_SIGMA_M, plate[:, :2].max(axis=0) - SIDE_SIGMA_M
+        on = ((seen[:, :2] > low) & (seen[:, :2] < high)).all(axis=1) & (np.abs(seen[:, 2]) < NEAR_M)
+    index = np.flatnonzero(on)
+    if len(index) >= FEWEST:
+        index = index[np.abs(seen[index, 2] - np.median(seen[index, 2])) < 2 * PLANE_M]
+    if len(index) < FEWEST:
+        return Trace(np.zeros((0, 3)), 0.0, 0.0, "fewer than 30 returns on the plate")
+    few = index[np.unique(np.linspace(0, len(index) - 1, min(_MOST, len(index))).round().astype(int))]
+    offsets = np.zeros(len(few)) if cloud.offsets_s is None else cloud.offsets_s[few].astype(np.float64)
+    rms = float(np.sqrt(np.mean((seen[few, 2] - seen[few, 2].mean()) ** 2)))
+    return Trace(cloud.points_m[few].astype(np.float64), 0.0, rms, offsets_s=offsets)
 
 
 def side_faces(patch: Patch, board: BoardPose, plate: Float64Array, T: Float64Array) -> tuple[Face, ...]:

@@ -1,4 +1,4 @@
-"""A moving board and whole scans -> roughly by how much the camera's clock is ahead, from nothing.
+"""A moving board and whole scans or clouds -> roughly by how much the camera's clock is ahead, from nothing.
 
 The fine stage follows the board's speed and needs returns that are on the board. Here every offset of a grid is tried: the
 right one puts the board, as it was then, where the returns are.
@@ -10,10 +10,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from wallkit.calib.cloud_board import returns_on_plate
 from wallkit.calib.scan_board import Trace, find_trace, returns_of
 from wallkit.calib.sightings import BoardPose
 from wallkit.calib.time_offset import BoardTrack, TimedTrace, poses_at
-from wallkit.core.types import Float64Array, Scan
+from wallkit.core.types import Float64Array, PointCloud, Scan
 
 # how far offsets are looked for, and in what steps
 FARTHEST_S, _STEP_S = 0.8, 0.05
@@ -24,7 +25,7 @@ _MISSED_M = 0.1
 
 def coarse_offset(
     track: BoardTrack,
-    scans: Sequence[Scan],
+    scans: Sequence[Scan | PointCloud],
     T: Float64Array,
     plate_corners: Float64Array,
     *,
@@ -55,7 +56,7 @@ def coarse_offset(
 
 def traces_at(
     track: BoardTrack,
-    scans: Sequence[Scan],
+    scans: Sequence[Scan | PointCloud],
     T: Float64Array,
     plate_corners: Float64Array,
     tau_s: float,
@@ -76,15 +77,22 @@ def traces_at(
     return found
 
 
-def _board_at(track: BoardTrack, scan: Scan, tau_s: float) -> BoardPose | None:
+def _board_at(track: BoardTrack, scan: Scan | PointCloud, tau_s: float) -> BoardPose | None:
     time = np.array([scan.stamp_ns + round(tau_s * 1e9)], dtype=np.int64)
     pose = poses_at(track, time)[0][0]
     return BoardPose(pose, np.eye(6)) if np.isfinite(pose).all() else None
 
 
 def _trace(
-    scan: Scan, board: BoardPose, plate: Float64Array, T: Float64Array, sigma_range_m: float, is_known: bool
+    scan: Scan | PointCloud,
+    board: BoardPose,
+    plate: Float64Array,
+    T: Float64Array,
+    sigma_range_m: float,
+    is_known: bool,
 ) -> Trace:
+    if isinstance(scan, PointCloud):
+        return returns_on_plate(scan, board, plate, T)
     return find_trace(returns_of(scan), board, plate, T, sigma_range_m=sigma_range_m, plate_is_known=is_known)
 
 

@@ -11,9 +11,10 @@ from wallkit.calib.audits import Audit
 from wallkit.calib.edges import EdgeFit, edge_fit
 from wallkit.calib.extrinsics import Extrinsics, Hold, ViewFit, evaluate
 from wallkit.calib.gates import Gate
+from wallkit.calib.observability import observability
 from wallkit.calib.pixel_error import pixel_error_95
 from wallkit.calib.sightings import BoardPose, Sighting, problem_from_sightings
-from wallkit.calib.solver import fit
+from wallkit.calib.solver import Placement, fit
 from wallkit.core.calibration import Calibration
 from wallkit.core.types import Float64Array
 
@@ -22,6 +23,8 @@ HELD_OUT_OWN = (
     " (leave-one-view-out), because these files are among those that the calibration was made from"
 )
 HELD_OUT_OTHER = "every view is held out: the calibration was made from other files"
+# CR2 needs more views than unknowns
+FEWEST_IN_HALF = 8
 FIT = "the views are those of the fit and cannot be held out: too few, or they do not fix the transform"
 
 
@@ -47,6 +50,8 @@ class Evidence:
         clock_words: why there is none.
         faults: what is wrong with the camera_info and the frames, a sentence each; None when there was nothing to check.
         target_free: gates that need no board.
+        halves: solves from the first and the second half of the views; None where they are too few.
+        refit: (RMS of the corners with the camera under judgement, of one refitted, held out) [px]; None where nobody tried.
         hull_share: share of the image in the convex hull of all board corners.
     """
 
@@ -73,6 +78,8 @@ class Evidence:
     faults: tuple[str, ...] | None = None
     target_free: tuple[Gate, ...] = ()
     hull_share: float = float("nan")
+    halves: tuple[Placement, Placement] | None = None
+    refit: tuple[float, float] | None = None
 
     @property
     def place(self) -> Float64Array | None:
@@ -154,6 +161,7 @@ def with_sightings(
         covariance_source=source,
         scale=scale,
         edges=edges,
+        halves=_halves(sightings, fresh),
     )
     return with_pixel_error(found)
 
@@ -183,6 +191,21 @@ def _places_without(
         without = fit(problem.of(rest), fresh.T, basis=basis, rounds=6).T if used[i] else fresh.T
         places.append(without @ back @ T)
     return places, HELD_OUT_OWN
+
+
+def _halves(sightings: Sequence[Sighting], fresh: Extrinsics) -> tuple[Placement, Placement] | None:
+    """The solve again from the first and from the second half of all views, in the order of the recording.
+
+    Views that the fresh solve left out are in: after a bump they are the ones that tell.
+    """
+    problem, middle = problem_from_sightings(sightings), len(sightings) // 2
+    if middle < FEWEST_IN_HALF:
+        return None
+    halves = [problem.of(list(half)) for half in (range(middle), range(middle, len(problem)))]
+    first, second = (fit(half, fresh.T) for half in halves)
+    if any(observability(place, half).unseen for place, half in zip((first, second), halves, strict=True)):
+        return None
+    return first, second
 
 
 def _covariance(

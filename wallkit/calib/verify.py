@@ -10,6 +10,7 @@ from wallkit.calib.gates import Gate, verdict_of
 from wallkit.calib.verify_agreement import boards_gate, urdf_gate
 from wallkit.calib.verify_audit import clock_gate, intrinsics_gate, sanity_gate, square_gate
 from wallkit.calib.verify_fit import edge_gate, inlier_gate, mean_gate, plane_gate, trend_gate, worst_view_gate
+from wallkit.calib.verify_halves import halves_gate, refit_gate
 from wallkit.calib.verify_limits import VerifyLimits
 from wallkit.calib.verify_sure import (
     focal_gate,
@@ -53,6 +54,7 @@ def verify(evidence: Evidence, limits: VerifyLimits | None = None) -> Judgement:
 GATES: Mapping[str, Callable[[Evidence, VerifyLimits], Gate]] = {
     "sanity": sanity_gate,
     "intrinsics": intrinsics_gate,
+    "refit": refit_gate,
     "plane": plane_gate,
     "worst-view": worst_view_gate,
     "inliers": inlier_gate,
@@ -60,6 +62,7 @@ GATES: Mapping[str, Callable[[Evidence, VerifyLimits], Gate]] = {
     "mean": mean_gate,
     "trend": trend_gate,
     "boards": boards_gate,
+    "halves": halves_gate,
     "observability": observability_gate,
     "views": views_gate,
     "hull": hull_gate,

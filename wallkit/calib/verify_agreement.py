@@ -37,7 +37,7 @@ def urdf_gate(evidence: Evidence, limits: VerifyLimits) -> Gate:
     p, covariance = max(
         ((chance_of(d, [known, trusted]), known.covariance) for known in sides), key=lambda pair: pair[0]
     )
-    words = _axis_words(d, covariance + trusted.covariance)
+    words = axis_words(d, covariance + trusted.covariance)
     wanted, refused = (
         f">= {limits.urdf_p:g}",
         f"< {limits.urdf_bad_p:g} and > {limits.urdf_deg:g} deg or {limits.urdf_mm:g} mm",
@@ -70,7 +70,7 @@ def boards_gate(evidence: Evidence, limits: VerifyLimits) -> Gate:
     # in the axes of the solve, whose degrees of freedom they are
     p = chance_of(difference(fresh.T, T), sides)
     spread = sum(side.covariance for side in sides[1:]) + sides[0].covariance
-    words = _axis_words(d, spread)
+    words = axis_words(d, spread)
     wanted, refused = (
         f">= {limits.urdf_p:g}",
         f"< {limits.urdf_bad_p:g} and > {limits.urdf_deg:g} deg or {limits.urdf_mm:g} mm",
@@ -95,7 +95,7 @@ def _sides(evidence: Evidence, T: Float64Array) -> list[Known]:
     return known + ([solved(fresh.placement)] if fresh is not None and fresh.covariance is not None else [])
 
 
-def _axis_words(d: Float64Array, covariance: Float64Array) -> str:
+def axis_words(d: Float64Array, covariance: Float64Array) -> str:
     """The degrees of freedom that carry the difference, the strongest first."""
     z = np.abs(d) / np.sqrt(np.diag(covariance))
     strong = [i for i in np.argsort(-z, kind="stable") if z[i] > 3] or [int(z.argmax())]

@@ -13,7 +13,7 @@ from wallkit.calib.verify_limits import VerifyLimits
 
 def views_gate(evidence: Evidence, limits: VerifyLimits) -> Gate:
     """How many views there are; too few can never be a PASS."""
-    if evidence.target_free:
+    if evidence.target_free and not evidence.boards:
         return not_asked("views", evidence.why_no_fresh)
     count = len(evidence.kept) if evidence.sightings or evidence.place is not None else len(evidence.boards)
     reason = (

@@ -44,6 +44,8 @@ MODELS = ["auto", "k1k2", "radtan", "plumb_bob", "rational_polynomial", "equidis
     help="Also write an HTML page with figures and reasons.",
 )
 @common.overwrite_option
+@common.config_option
+@common.set_option
 @common.json_option
 @common.quiet_option
 @common.dry_run_option
@@ -63,6 +65,8 @@ def intrinsics(
     ros: Path | None,
     report: Path | None,
     overwrite: bool,
+    config_path: Path | None,
+    words: tuple[str, ...],
     as_json: bool,
     quiet: bool,
     dry_run: bool,
@@ -83,6 +87,7 @@ def intrinsics(
     from wallkit.calib.boards import board_from
     from wallkit.pipelines.calib_captures import CaptureRequest
     from wallkit.pipelines.calib_intrinsics import calibrate_camera, document
+    from wallkit.pipelines.config import load_config
     from wallkit.pipelines.outputs import check_file_out
 
     board, size = board_from(board_words), _size(size_words)
@@ -91,10 +96,13 @@ def intrinsics(
     if dry_run:
         click.echo(f"would look for {board.words} in {', '.join(map(str, inputs))} and write {out or 'nothing'}")
         return
-    words = " ".join(["wallkit calib intrinsics", *map(str, inputs), f"--board {board_words} --model {model}"])
+    limits = load_config(config_path, words).config.calib.camera
+    command = " ".join(["wallkit calib intrinsics", *map(str, inputs), f"--board {board_words} --model {model}"])
     request = CaptureRequest(inputs, board, topic, size, half_window)
     with common.progress("searching", None, quiet=quiet) as update:
-        result = calibrate_camera(request, model=model, name=name, frame=frame, command=words, progress=update)
+        result = calibrate_camera(
+            request, model=model, name=name, frame=frame, command=command, limits=limits, progress=update
+        )
     _write(result, out, ros)
     if report is not None:
         from wallkit.pipelines.calib_intrinsics_page import page_of

@@ -28,12 +28,15 @@ FILE = click.Path(path_type=Path)
 @click.option("--lidar", "lidar_link", default="", metavar="LINK", help="The LiDAR's frame in the URDF.")
 @click.option("--camera-frame", "camera_link", default="", metavar="LINK", help="The optical frame in the URDF.")
 @click.option("--prior", default="1deg,10mm", show_default=True, metavar="TURN,SHIFT", help="Trust in the URDF.")
+@click.option("--room", is_flag=True, help="With --board: ask the room, too; a board and a room that disagree FAIL.")
 @click.option("--lidar-height", type=float, metavar="M", help="Height of a 2-D LiDAR, for the floor line (no board).")
 @click.option("--scan", "scan_topic", metavar="TOPIC", help="LiDAR topic of a log, when there are several.")
 @click.option("--image", "image_topic", metavar="TOPIC", help="Camera topic of a log, when there are several.")
 @click.option("--report", type=FILE, metavar="FILE", help="Also write an HTML page with overlays and figures.")
 @click.option("--write", is_flag=True, help="Store verdict and pixel errors in the calibration file.")
 @common.out_option
+@common.config_option
+@common.set_option
 @common.seed_option
 @common.overwrite_option
 @common.json_option
@@ -57,7 +60,8 @@ def verify(
 
     With --board, every view of the board is judged by a calibration that did not use it. Pictures without scans judge the
     intrinsics alone. Without --board the room itself is the target: that can contradict a calibration, and support it along
-    the axes named, but never PASS as a whole. Nothing is written unless --write, --out or --report says so.
+    the axes named, but never PASS as a whole. Nothing is written unless --write, --out or --report says so. The bounds are
+    settings (`wallkit config show`, calib.verify).
 
     Exits 0 for PASS, 1 for FAIL, 4 when the data cannot tell, 2 if it could not be done.
 
@@ -67,8 +71,10 @@ def verify(
       wallkit calib verify log.mcap --calib cal.toml --board board.toml --urdf robot.urdf --report verify.html
       wallkit calib verify pictures/ --scans scans/ --calib cal.toml --board chessboard:11x8:0.019 --json
       wallkit calib verify drive.mcap --calib cal.toml
+      wallkit calib verify log.mcap --calib cal.toml --board board.toml --set calib.verify.pixel_px=8
     """
     from wallkit.pipelines.calib_verify import VerifyRequest, verify_calibration
+    from wallkit.pipelines.config import load_config
     from wallkit.pipelines.outputs import check_file_out, write_whole
 
     if given["write"] and (out is not None or calibration.suffix != ".toml"):
@@ -89,14 +95,16 @@ def verify(
         scan_topic=given["scan_topic"],
         image_topic=given["image_topic"],
         lidar_height_m=given["lidar_height"],
+        room=given["room"],
         seed=given["seed"],
     )
+    limits = load_config(given["config_path"], given["words"]).config.calib.verify
     if dry_run:
         target = calibration if given["write"] else out or "nothing"
         click.echo(f"would judge {calibration} by {', '.join(map(str, inputs))} and write {target}")
         return
     with common.progress("looking", None, quiet=quiet) as update:
-        found = verify_calibration(request, progress=update)
+        found = verify_calibration(request, limits=limits, progress=update)
     if (target_file := calibration if given["write"] else out) is not None:
         from wallkit.calib.store import toml_from_calibration
 
@@ -140,7 +148,9 @@ def _page(found: Verification) -> list[str]:
     rows = [[g.verdict, g.name, f"{g.value:.4g} {g.unit}".rstrip(), g.wanted, g.refused] for g in asked]
     lines += ["", *common.table(["", "asked", "found", "PASS", "FAIL"], rows).splitlines()]
     skipped = [gate for _, gate in found.judgement.gates if not gate.verdict and "alone" not in gate.reason]
-    if skipped:
+    if found.is_camera_alone:
+        lines += ["", f"not asked {len(skipped)} questions about a LiDAR: pictures come without scans (--scans)"]
+    elif skipped:
         lines += ["", *(f"not asked {gate.name}: {gate.reason}" for gate in skipped)]
     return [*lines, "", *_ending(found)]
 

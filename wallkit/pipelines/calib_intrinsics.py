@@ -12,6 +12,7 @@ import numpy as np
 import wallkit
 from wallkit.calib.camera_coverage import Coverage, coverage_of
 from wallkit.calib.camera_gates import camera_gates
+from wallkit.calib.camera_limits import CameraLimits
 from wallkit.calib.cross_validation import CHOICES, Candidate, Halves, candidates, choose, compare_halves
 from wallkit.calib.gates import Gate, verdict_of
 from wallkit.calib.intrinsics import Intrinsics, calibrate, rms_by_view
@@ -62,6 +63,7 @@ def calibrate_camera(
     name: str = "",
     frame: str = "",
     command: str = "",
+    limits: CameraLimits | None = None,
     progress: Callable[[int], None] = lambda done: None,
 ) -> CameraResult:
     """Find the board, choose the views and the lens model, calibrate, and ask how far to trust it.
@@ -79,7 +81,7 @@ def calibrate_camera(
     chosen = choose(tried) if model == AUTO and tried else "plumb_bob" if model == AUTO else model
     found = calibrate(capture, chosen)
     coverage, halves = coverage_of(found.fit, found.seen), compare_halves(found, capture)
-    gates = camera_gates(found, coverage, halves, tried)
+    gates = camera_gates(found, coverage, halves, tried, limits or CameraLimits())
     camera = _named(found.camera, name or capture.camera_name, frame or capture.frame)
     files = input_files(request.inputs)
     calibration = Calibration(

@@ -12,6 +12,7 @@ from wallkit.calib.boards import Board
 from wallkit.calib.evidence import Evidence, evidence_of, with_pixel_error, with_sightings
 from wallkit.calib.extrinsics import Hold
 from wallkit.calib.from_urdf import transform_from_urdf
+from wallkit.calib.gates import Gate, not_asked
 from wallkit.calib.lidars import sigma_range
 from wallkit.calib.sanity import differs, faults_of_info
 from wallkit.calib.store import read_calibration
@@ -46,6 +47,7 @@ class VerifyRequest:
         urdf, lidar_link, camera_link, prior: the robot, its frames (else those of the calibration), and "1deg,10mm".
         sigma_range: "15mm" or the name of a LiDAR; None: assumed.
         scan_topic, image_topic: of a log that has several.
+        room: ask the room itself, too, beside the boards.
         lidar_height_m: of a planar LiDAR above the floor, for the floor line; None: not asked.
     """
 
@@ -61,6 +63,7 @@ class VerifyRequest:
     scan_topic: str | None = None
     image_topic: str | None = None
     lidar_height_m: float | None = None
+    room: bool = False
     seed: int = 0
 
 
@@ -83,6 +86,11 @@ class Verification:
     run: ExtrinsicsRun | None
     left_out: tuple[tuple[str, str], ...]
     looked_at: int
+
+    @property
+    def is_camera_alone(self) -> bool:
+        """Whether only pictures of a board were shown."""
+        return self.request.board is not None and _is_camera_alone(self.request)
 
     def stored(self) -> Calibration:
         """The calibration with its verdict and pixel errors, as `--write` stores it."""
@@ -118,8 +126,9 @@ def verify_calibration(
     sigma_m, source = sigma_range(request.sigma_range)
     urdf, said = _urdf(request, calibration)
     evidence = evidence_of(calibration, sigma_range_m=sigma_m, sigma_source=source, urdf=urdf)
-    notes = [f"--lidar-sigma was not given: {sigma_m * 1e3:.0f} mm is assumed"] if source == "assumed" else []
-    notes += said
+    notes = list(said)
+    if source == "assumed" and request.board is not None and not _is_camera_alone(request):
+        notes.insert(0, f"--lidar-sigma was not given: {sigma_m * 1e3:.0f} mm is assumed")
     run: ExtrinsicsRun | None = None
     left_out: list[tuple[str, str]] = []
     looked_at = 0
@@ -140,6 +149,8 @@ def verify_calibration(
         evidence, run, left_out = _with_boards(evidence, gathered, request)
         looked_at = gathered.looked_at
         notes += gathered.notes
+        if request.room:
+            evidence = replace(evidence, target_free=_told(free_gates(request, calibration, progress)[0]))
     evidence, said = _with_sanity(evidence, request)
     notes += said
     judgement = verify(evidence, limits)
@@ -157,6 +168,11 @@ def is_files(inputs: Sequence[Path]) -> bool:
 
 
 # ------------------------------------------------------------------------------------------------ details
+
+
+def _told(gates: Sequence[Gate]) -> tuple[Gate, ...]:
+    """What the room contradicts or supports; where it shows nothing, boards are asked anyhow."""
+    return tuple(not_asked(g.name, g.reason) if g.verdict == "CANNOT TELL" else g for g in gates)
 
 
 def _is_camera_alone(request: VerifyRequest) -> bool:
@@ -262,6 +278,8 @@ _NEXT = {
     "reprojection": "run wallkit calib extrinsics on this log and verify its result on another",
     "mean": "measure a wall with a tape: do the LiDAR's ranges read long or short?",
     "trend": "measure a row of squares, and a wall with a tape, before anything else",
+    "refit": "run wallkit calib intrinsics on these pictures",
+    "halves": "look whether the LiDAR or the camera is loose, fasten it, and record again",
     "boards": "run wallkit calib extrinsics on this log: something moved since",
     "square-size": "measure a row of squares with a ruler and correct --board",
     "time-offset": "store the offset with the calibration, or synchronise the clocks",

@@ -10,7 +10,7 @@ from wallkit.calib.board_pose import AMBIGUOUS, pose_of_board
 from wallkit.calib.coarse_offset import FARTHEST_S, coarse_offset, traces_at
 from wallkit.calib.detect import find_quickly
 from wallkit.calib.time_offset import BoardTrack, TimeOffset, time_offset
-from wallkit.core.types import CameraImage, Scan
+from wallkit.core.types import CameraImage, PointCloud, Scan
 from wallkit.logs.reader import Log, open_log
 from wallkit.pipelines.calibrate_extrinsics import ExtrinsicsRun, Gathered, outline_of
 from wallkit.pipelines.calibrate_log import grey_of
@@ -21,9 +21,9 @@ _NEAR_NS = 150_000_000
 
 
 def with_clock(run: ExtrinsicsRun) -> tuple[ExtrinsicsRun, TimeOffset | None]:
-    """The run with the time offset of its log where it can be told; None of files, and of clouds (no beam times)."""
+    """The run with the time offset of its log where it can be told; None of files."""
     source = run.gathered.log
-    if source is None or not run.is_planar or run.result.kind == "refused":
+    if source is None or run.result.kind == "refused":
         return run, None
     windows = _chosen(source.moving)
     if not windows:
@@ -38,6 +38,10 @@ def with_clock(run: ExtrinsicsRun) -> tuple[ExtrinsicsRun, TimeOffset | None]:
     coarse_s = coarse_offset(track, scans, T, plate, sigma_range_m=sigma_m, plate_is_known=known)
     traces = traces_at(track, scans, T, plate, coarse_s, sigma_range_m=sigma_m, plate_is_known=known)
     found = time_offset(track, traces, T, sigma_range_m=sigma_m, start_s=coarse_s)
+    if any(isinstance(scan, PointCloud) and scan.offsets_s is None for scan in scans):
+        found = replace(
+            found, words=f"{found.words}; the clouds carry no times, so up to a sweep of the LiDAR is in it"
+        )
     if found.verdict != "known":
         return run, found
     gathered = replace(
@@ -79,12 +83,12 @@ def _track(log: Log, topic: str, gathered: Gathered, windows: list[tuple[int, in
     return BoardTrack(np.array(stamps, dtype=np.int64)[order], np.array(poses)[order])
 
 
-def _scans(log: Log, topic: str, track: BoardTrack) -> list[Scan]:
+def _scans(log: Log, topic: str, track: BoardTrack) -> list[Scan | PointCloud]:
     """Scans of the times when the board was seen, whatever the offset is."""
     reach = _NEAR_NS + int(FARTHEST_S * 1e9)
-    scans = []
+    scans: list[Scan | PointCloud] = []
     for message in log.messages([topic], int(track.stamps_ns[0]) - reach, int(track.stamps_ns[-1]) + reach):
         scan = message.value
-        if isinstance(scan, Scan) and int(np.abs(track.stamps_ns - scan.stamp_ns).min()) <= reach:
+        if isinstance(scan, (Scan, PointCloud)) and int(np.abs(track.stamps_ns - scan.stamp_ns).min()) <= reach:
             scans.append(scan)
     return scans

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from wallkit.calib.settings import CalibSettings
 from wallkit.core.config import Source, build, read_toml, section, setting, source_from_words
 from wallkit.localize.settings import LocalizeSettings
 from wallkit.logs.sync import SyncConfig
@@ -31,6 +32,7 @@ class Config:
     rules: Tolerances = section(Tolerances, "where the rules of `wallkit map validate` draw the line")
     audit: AuditSettings = section(AuditSettings, "how `wallkit map audit` compares a map with a log")
     segment: SegmentSettings = section(SegmentSettings, "what the camera sees")
+    calib: CalibSettings = section(CalibSettings, "where calibration draws the line")
     points: PointsSettings = section(PointsSettings, "which returns are trusted")
     localize: LocalizeSettings = section(LocalizeSettings, "the filter")
     evaluate: EvaluateSettings = section(EvaluateSettings, "when an estimate is right or wrong")
