@@ -1,4 +1,4 @@
-.PHONY: demo test slow lint docs bench sample
+.PHONY: demo test slow lint docs bench sample calibration
 demo:
 	wallkit demo --overwrite
 test:
@@ -13,3 +13,19 @@ bench:
 	wallkit bench update --numpy
 sample:
 	python -m wallkit.pipelines.sample wallkit/sample
+# the sample robot's calibration, calib/front.toml and calib/laser-to-front.toml (needs OpenGL, some minutes; exit code 4 is CANNOT TELL)
+calibration:
+	rm -rf build/calibration && mkdir -p build/calibration && cp calib/boards/*.toml calib/robot.urdf build/calibration
+	cd build/calibration && wallkit simulate boards --board charuco-a3.toml --robot robot.urdf -s lidar.frame=laser \
+		--anywhere --near 0.25 --far 0.7 --count 60 --seed 2 -o lens
+	cd build/calibration && wallkit simulate boards --board chessboard-plate-610x850.toml --robot robot.urdf -s lidar.frame=laser \
+		--count 40 --seed 1 -o boards
+	cd build/calibration && wallkit simulate boards --board chessboard-plate-610x850.toml --robot robot.urdf -s lidar.frame=laser \
+		--count 40 --seed 3 -o again
+	cd build/calibration && wallkit calib intrinsics lens/images --board charuco-a3.toml --name front --frame front_camera_optical \
+		-o front.toml || test $$? -eq 4
+	cd build/calibration && wallkit calib extrinsics boards/images --scans boards/scans --board chessboard-plate-610x850.toml \
+		--camera front.toml --lidar laser --sigma-range 10mm -o laser-to-front.toml
+	cd build/calibration && wallkit calib verify again/images --scans again/scans --board chessboard-plate-610x850.toml \
+		--calib laser-to-front.toml --lidar-sigma 10mm --urdf robot.urdf --write
+	cp build/calibration/front.toml build/calibration/laser-to-front.toml calib/

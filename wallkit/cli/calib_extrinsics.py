@@ -83,6 +83,8 @@ def extrinsics(
       wallkit calib extrinsics pictures/ --scans scans/ --camera cam.toml --board chessboard:11x8:0.019
       wallkit calib extrinsics corners.npz --scans clouds/ --camera cam.yaml --board board.toml
     """
+    from dataclasses import replace
+
     from wallkit.calib.boards import board_from
     from wallkit.pipelines.calibrate_clock import with_clock
     from wallkit.pipelines.calibrate_extrinsics import run_extrinsics
@@ -105,10 +107,12 @@ def extrinsics(
     topics = (given["scan_topic"], given["image_topic"])
     with common.progress("looking for the board", None, quiet=quiet) as done:
         gathered = gather(inputs, given["scans"], board, given["camera_file"], topics=topics, done=done)
+    # files do not name the LiDAR's frame
+    gathered = replace(gathered, lidar_frame=gathered.lidar_frame or given["lidar_link"] or "")
     run, clock = with_clock(run_extrinsics(gathered, options))
     warnings = [*notes, *gathered.notes, *run.result.warnings, *([run.scale.words] if run.scale.is_suspect else [])]
     warnings += [run.bias.words] if run.bias is not None and run.bias.is_suspect else []
-    made = run.calibration(provenance(gathered, notes=tuple(warnings)))
+    made = run.calibration(provenance(gathered, common.typed(ctx), notes=tuple(warnings)))
     is_written = out is not None and made is not None
     if out is not None and made is not None:
         from wallkit.calib.store import toml_from_calibration

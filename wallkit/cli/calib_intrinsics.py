@@ -97,11 +97,10 @@ def intrinsics(
         click.echo(f"would look for {board.words} in {', '.join(map(str, inputs))} and write {out or 'nothing'}")
         return
     limits = load_config(config_path, words).config.calib.camera
-    command = " ".join(["wallkit calib intrinsics", *map(str, inputs), f"--board {board_words} --model {model}"])
     request = CaptureRequest(inputs, board, topic, size, half_window)
     with common.progress("searching", None, quiet=quiet) as update:
         result = calibrate_camera(
-            request, model=model, name=name, frame=frame, command=command, limits=limits, progress=update
+            request, model=model, name=name, frame=frame, command=common.typed(ctx), limits=limits, progress=update
         )
     _write(result, out, ros)
     if report is not None:

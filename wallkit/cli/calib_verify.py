@@ -118,7 +118,7 @@ def verify(
 
         common.emit(document(found))
     else:
-        click.echo("\n".join(_page(found)))
+        click.echo("\n".join(_page(found, is_stored=target_file is not None)))
         for note in found.notes:
             common.warn(note, quiet=quiet)
     ctx.exit(EXITS[found.judgement.verdict])
@@ -133,7 +133,7 @@ def _board(words: str | None) -> Any:
     return None if words is None else board_from(words)
 
 
-def _page(found: Verification) -> list[str]:
+def _page(found: Verification, *, is_stored: bool) -> list[str]:
     """All answers as a table, and the verdict at the end, where a terminal stands."""
     evidence = found.evidence
     lines = [
@@ -152,10 +152,10 @@ def _page(found: Verification) -> list[str]:
         lines += ["", f"not asked {len(skipped)} questions about a LiDAR: pictures come without scans (--scans)"]
     elif skipped:
         lines += ["", *(f"not asked {gate.name}: {gate.reason}" for gate in skipped)]
-    return [*lines, "", *_ending(found)]
+    return [*lines, "", *_ending(found, is_stored=is_stored)]
 
 
-def _ending(found: Verification) -> list[str]:
+def _ending(found: Verification, *, is_stored: bool) -> list[str]:
     """What a person takes away in five seconds."""
     from wallkit.calib.verify_sure import pixel_error_at
     from wallkit.pipelines.calib_verify import next_step, pixel_words, verdict_meaning
@@ -168,4 +168,5 @@ def _ending(found: Verification) -> list[str]:
         lines.append(f"           and {len(reasons) - _MOST_REASONS} more, in the table")
     if found.calibration.T_camera_lidar is not None:
         lines.append(f"  means    {pixel_words(found, pixel_error_at(found.evidence, found.limits.reference_m))}")
-    return [*lines, f"  next     {next_step(found)}"]
+    is_done = judgement.verdict == "PASS" and is_stored
+    return [*lines, f"  next     {'use it' if is_done else next_step(found)}"]

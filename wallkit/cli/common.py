@@ -93,6 +93,29 @@ def options(*decorators: Callable[[F], F]) -> Callable[[F], F]:
     return apply
 
 
+# what changes no result, or only where it goes
+_NOT_REMEMBERED = {"out", "overwrite", "as_json", "quiet", "dry_run", "report", "ros", "write"}
+
+
+def typed(ctx: click.Context) -> str:
+    """The command as typed, for a result to remember: without where it was written, and without places of this machine."""
+    import shlex
+
+    from wallkit.pipelines.provenance import portable
+
+    words = ["wallkit", "calib", str(ctx.info_name)]
+    for option in ctx.command.params:
+        name = str(option.name)
+        if name in _NOT_REMEMBERED or ctx.get_parameter_source(name) is not click.core.ParameterSource.COMMANDLINE:
+            continue
+        value = ctx.params[name]
+        values = value if isinstance(value, tuple) else (value,)
+        for one in values:
+            flag = [max(option.opts, key=len)] if isinstance(option, click.Option) else []
+            words += flag if one is True else [*flag, portable(str(one))]
+    return shlex.join(words)
+
+
 def emit(document: dict[str, Any]) -> None:
     """One JSON document on stdout; numbers that do not exist are null."""
     click.echo(json.dumps({"schema": 1, **plain(document)}, indent=2, allow_nan=False))

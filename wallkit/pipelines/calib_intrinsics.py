@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-import wallkit
 from wallkit.calib.camera_coverage import Coverage, coverage_of
 from wallkit.calib.camera_gates import camera_gates
 from wallkit.calib.camera_limits import CameraLimits
@@ -23,7 +22,7 @@ from wallkit.core.calibration import Calibration, Provenance, Verdict
 from wallkit.core.camera import Camera
 from wallkit.core.types import Float64Array, Int64Array
 from wallkit.pipelines.calib_captures import CaptureRequest, capture_from, input_files
-from wallkit.pipelines.run_folder import sha256
+from wallkit.pipelines.provenance import digests, versions
 
 AUTO = "auto"
 DEFINITION = "sqrt(sum |projected - observed|^2 / N) over corners [px]"
@@ -89,8 +88,8 @@ def calibrate_camera(
         camera_covariance=found.covariance,
         verdict=verdict_of(gates),
         provenance=Provenance(
-            {file.name: sha256(file) for file in files},
-            {"wallkit": wallkit.__version__, "opencv": _opencv_version(), "numpy": np.__version__},
+            digests(files),
+            versions(),
             command,
             tuple(_notes(found, capture, gates)),
         ),
@@ -222,9 +221,3 @@ def _notes(found: Intrinsics, capture: Capture, gates: tuple[Gate, ...]) -> list
 
 def _named(camera: Camera, name: str, frame: str) -> Camera:
     return Camera(camera.model, camera.width, camera.height, camera.K, camera.D, name, frame)
-
-
-def _opencv_version() -> str:
-    import cv2
-
-    return str(cv2.__version__)

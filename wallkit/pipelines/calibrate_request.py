@@ -6,9 +6,6 @@ import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import numpy as np
-
-import wallkit
 from wallkit.calib.boards import Board
 from wallkit.calib.extrinsics import Hold
 from wallkit.calib.from_urdf import transform_from_urdf
@@ -17,7 +14,7 @@ from wallkit.core.calibration import Provenance
 from wallkit.errors import CalibrationError
 from wallkit.pipelines.calibrate_extrinsics import Gathered, SolveOptions
 from wallkit.pipelines.calibrate_files import PICTURES, gather_files
-from wallkit.pipelines.run_folder import sha256
+from wallkit.pipelines.provenance import digests, versions
 
 
 def gather(
@@ -94,19 +91,9 @@ def prior_from_words(words: str) -> tuple[float, float]:
     return float(found[1]), float(found[2]) * {"mm": 1.0, "cm": 10.0, "m": 1000.0}[found[3]]
 
 
-def provenance(gathered: Gathered, *, notes: tuple[str, ...] = ()) -> Provenance:
-    """The sha256 of every input by its name, and versions; nothing that differs from run to run."""
-    import cv2
-    import scipy
-
-    versions = {
-        "wallkit": wallkit.__version__,
-        "opencv": cv2.__version__,
-        "numpy": np.__version__,
-        "scipy": scipy.__version__,
-    }
-    inputs = {path.name: sha256(path) for path in gathered.files if path.is_file()}
-    return Provenance(inputs, versions, "wallkit calib extrinsics", notes)
+def provenance(gathered: Gathered, command: str, *, notes: tuple[str, ...] = ()) -> Provenance:
+    """The sha256 of every input by its name, and versions; nothing that differs from run to run or from place to place."""
+    return Provenance(digests(gathered.files), versions(), command, notes)
 
 
 def _are_files(inputs: Sequence[Path]) -> bool:
