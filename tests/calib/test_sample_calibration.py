@@ -1,4 +1,4 @@
-"""The sample robot's calibration in calib/: made by the Makefile's commands, verified, and near the URDF it was drawn from."""
+"""The sample robot's calibration in calib/: made by the Makefile's commands, verified, near the URDF it was drawn from."""
 
 from __future__ import annotations
 
