@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import cv2
 import pytest
+
+from tests.segment.altered import altered_oracle
+from tests.segment.drawn import picture
 
 
 @pytest.fixture
@@ -48,3 +52,49 @@ def test_fixture_takes_colours_and_keeps_what_is_there(wallkit, tmp_path, oracle
     done = wallkit("model", "fixture", "b.onnx", "--classes", "colours.toml")
     assert (done.code, "colours.toml:1: 'wall' is 'grey', no colour" in done.err) == (2, True)
     assert not (tmp_path / "b.onnx").exists()
+
+
+@pytest.fixture
+def pictures(tmp_path):
+    folder = tmp_path / "pictures"
+    folder.mkdir()
+    for k in range(2):
+        things = {"wall": (20 + 30 * k, 40, 300, 170), "person": (100, 60, 150, 180)}
+        cv2.imwrite(str(folder / f"{k}.png"), picture((180, 320), things)[..., ::-1])
+    return folder
+
+
+def test_verify_agrees_differs_with_a_cause_or_cannot_tell(wallkit, tmp_path, oracle, pictures):
+    done = wallkit("model", "verify", oracle, oracle, "--images", pictures, "--json")
+    assert (done.code, done.json["verdict"], done.json["things_a"], done.json["match_share"]) == (0, "agree", 4, 1.0)
+    altered_oracle(tmp_path / "b.onnx", "bgr", (192, 320))
+    done = wallkit("model", "verify", oracle, "b.onnx", "--images", pictures)
+    assert done.code == 1
+    assert "because  B (b.onnx) takes blue, green, red (BGR) instead of RGB" in done.out
+    assert "verdict  differ: 50% of the things are matched, 95% were asked" in done.out
+    cv2.imwrite(str(tmp_path / "empty.png"), picture((180, 320), {}))
+    done = wallkit("model", "verify", oracle, oracle, "--images", "empty.png")
+    assert (done.code, "cannot tell: neither finds anything" in done.out) == (4, True)
+    (tmp_path / "broken.png").write_bytes(b"\x89PNG broken")
+    done = wallkit("model", "verify", oracle, oracle, "--images", "broken.png")
+    assert (done.code, "broken.png" in done.err, "Traceback" in done.err) == (2, True, False)
+
+
+def test_bench_splits_the_time_and_judges_it(wallkit, oracle, pictures):
+    words = ("model", "bench", oracle, "--images", pictures, "--rounds", "3", "--json")
+    done = wallkit(*words, "--threads", "1,2", "--spin", "off,on", "--rate", "0.1")
+    assert done.code == 0, done.err
+    rows = done.json["rows"]
+    assert [(row["threads"], row["spinning"]) for row in rows] == [(1, False), (2, False), (2, True)]
+    for row in rows:
+        cpu = row["cpu_ms"]
+        assert all(value > 0 for value in cpu.values())
+        assert row["beside_cpu_ms"] == pytest.approx(cpu["prepare"] + cpu["read"] + cpu["points"])
+        assert row["total_cpu_ms"] == pytest.approx(row["beside_cpu_ms"] + cpu["network"])
+    done = wallkit(*words, "--rate", "1000000")
+    assert (done.code, done.json["rows"][0]["verdict"]) == (1, "too slow")
+
+
+def test_bench_of_a_fixed_size_cannot_take_another(wallkit, oracle):
+    done = wallkit("model", "bench", oracle, "--sizes", "320")
+    assert (done.code, "its input is 192 x 320, not 320 x 320" in done.err) == (2, True)
