@@ -27,6 +27,7 @@ COMING = {
     "--image",
     "--model",
     "model export",
+    "--print-setup",
     "model train",
     "model bench",
     "model verify",
