@@ -123,6 +123,11 @@ def test_evaluate_report_and_compare_read_a_folder_again(wallkit, tmp_path):
     assert done.code == 0
     assert "error_mean_m" in done.out
     assert (tmp_path / "compare.html").is_file()
+    # a folder of result folders is one configuration over several logs
+    for name in ("basic", "known"):
+        shutil.copytree(tmp_path / name, tmp_path / "pool" / name)
+    table = wallkit("compare", "--paper", "pool", "known").out.splitlines()
+    assert [line.split()[:2] for line in table[1:3]] == [["pool", "2"], ["known", "1"]]
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 from dataclasses import replace
 
 import numpy as np
@@ -103,6 +104,43 @@ def test_later_seeds_look_at_no_image_and_say_what_a_first_one_says(world):
     assert (first.filtering.images > 0, second.filtering.images) == (True, 0)
     np.testing.assert_array_equal(second.steps.poses, alone.steps.poses)
     assert second.filtering.by_class == alone.filtering.by_class
+
+
+def test_only_images_for_updates_are_segmented_and_all_of_them_ahead(world):
+    """Ten images a second, an update every 0.2 m: most are never looked at, and none while the filter waits."""
+    given = ready(world)
+    segment, threads = given.sight.segment, []
+
+    def spy(image):
+        threads.append(threading.current_thread().name)
+        return segment(image)
+
+    given.sight.segment = spy
+    run = localize(given)
+    assert run.filtering.images == run.filtering.updates
+    assert len(threads) <= run.filtering.updates + 2
+    assert len(threads) < 0.6 * run.sync.images
+    assert sum(name.startswith("segment") for name in threads) >= run.filtering.updates - 2
+
+
+def test_an_image_that_cannot_be_read_is_none(world):
+    given = ready(world, may_fall_back=True)
+    segment = given.sight.segment
+
+    def broken(image):
+        if image.stamp_ns > camera_log.START_NS + 4 * 10**9:
+            raise LogError("no image")
+        return segment(image)
+
+    given.sight.segment = broken
+    run = localize(given)
+    assert 0 < run.filtering.without_image < run.filtering.updates
+
+
+def test_images_are_skipped_by_rate(world):
+    often, seldom = localize(ready(world)), localize(ready(world, words=("segment.rate_hz=1",)))
+    assert seldom.filtering.without_image > 0
+    assert seldom.filtering.images < often.filtering.images
 
 
 def test_a_failed_calibration_is_refused_unless_allowed(world, tmp_path):

@@ -65,29 +65,44 @@ def evaluate(ctx: click.Context, /, runs: tuple[Path, ...], as_json: bool, **fla
 @click.option(
     "-o", "--out", type=click.Path(path_type=Path), metavar="FILE.html", help="Write the comparison as a page."
 )
+@click.option("--paper", is_flag=True, help="A row for each: time, CPU, mean error, updates to converge, sd, memory.")
 @common.config_option
 @common.set_option
 @common.seed_option
 @common.json_option
-def compare(runs: tuple[Path, ...], truth: Path | None, out: Path | None, as_json: bool, **flags: Any) -> None:
+def compare(
+    runs: tuple[Path, ...], truth: Path | None, out: Path | None, paper: bool, as_json: bool, **flags: Any
+) -> None:
     """Put several runs side by side, with tests of significance against the first.
+
+    RUN is a result folder, of one seed or several, or a folder of such folders: one configuration over several logs.
 
     \b
     Examples:
       wallkit compare basic.wallkit filtered.wallkit
       wallkit compare a/ b/ c/ -o compare.html
+      wallkit compare --paper basic/ wall_mask/ soft_mask/
     """
     from dataclasses import asdict
 
-    from wallkit.pipelines.report import compare_runs, write_compare_report
+    from wallkit.pipelines.report import COMPARED, COMPARED_IN_PAPERS, compare_runs, write_compare_report
     from wallkit.report.compare import compare_rows, difference_rows
+    from wallkit.report.paper import paper_headers, paper_rows
 
     settings = _settings(flags["config_path"], flags["words"], None)
     names = _names(runs)
-    data = compare_runs([load_seeds(run, settings, truth) for run in runs], names, settings, seed=flags["seed"])
+    loaded, keys = [load_seeds(run, settings, truth) for run in runs], COMPARED_IN_PAPERS if paper else COMPARED
+    data = compare_runs(loaded, names, settings, seed=flags["seed"], keys=keys)
     if as_json:
         numbers = {c.name: {k: v.value for k, v in c.metrics.items()} for c in data.contenders}
-        common.emit({"runs": numbers, "differences": [{"a": a, "b": b, **asdict(d)} for a, b, d in data.differences]})
+        spreads = {c.name: {k: asdict(v) for k, v in c.spreads.items()} for c in data.contenders}
+        differences = [{"a": a, "b": b, **asdict(d)} for a, b, d in data.differences]
+        common.emit({"runs": numbers, "spreads": spreads, "differences": differences})
+    elif paper:
+        headers = paper_headers()
+        click.echo(common.table(headers, paper_rows(data), right=tuple(range(1, len(headers)))))
+        for key, what, how_sure in difference_rows(data):
+            click.echo(f"{key}: {what} [{how_sure}]")
     else:
         rows = [[row.key, *(f"{c.text}{' *' if c.is_best else ''}" for c in row.cells)] for row in compare_rows(data)]
         click.echo(common.table(["metric (* best)", *names], rows, right=tuple(range(1, len(names) + 1))))
@@ -132,13 +147,15 @@ def report(runs: tuple[Path, ...], truth: Path | None, out: Path | None, **flags
 
 
 def load_seeds(folder: Path, settings: EvaluateSettings, truth: Path | None) -> list[tuple[RunRecord, Evaluation]]:
-    """The runs in a result folder, judged: one, or one per seed."""
+    """The runs in a result folder, judged: one, or one per seed; of a folder of result folders all of theirs, by name."""
     from dataclasses import replace
 
     from wallkit.evaluate.tum import read_tum
     from wallkit.pipelines.evaluate import evaluate_steps
     from wallkit.pipelines.run_folder import read_run
 
+    if not (folder / "run.json").is_file() and (inside := sorted(path.parent for path in folder.glob("*/run.json"))):
+        return [pair for one in inside for pair in load_seeds(one, settings, truth)]
     folders = sorted(folder.glob("seed-*"), key=lambda path: int(path.name.removeprefix("seed-"))) or [folder]
     known = None if truth is None else read_tum(truth)
     found = []

@@ -34,6 +34,7 @@ from wallkit.logs.trajectories import first_pose, trajectory_of
 from wallkit.pipelines.cameras import CameraRequest
 from wallkit.pipelines.config import Config
 from wallkit.pipelines.maps import LoadedMap, load_map
+from wallkit.pipelines.need import UpdatesAhead
 from wallkit.pipelines.recorder import MessageWriter, Recorder
 from wallkit.pipelines.sight import Sight, sight_of
 from wallkit.pipelines.watch import Filtering, Moment, Watch
@@ -169,15 +170,18 @@ def localize(
     sync, recorder = SyncReport(), Recorder()
     watch = Watch(p.config.points, p.sight, moments)
     frames = synchronise(p.log, p.rig, p.config.logs, report=sync, start_ns=p.window_ns[0], end_ns=p.window_ns[1])
+    ahead = UpdatesAhead(p.config.localize)
+    looked = p.sight.ahead(frames, ahead) if p.sight else ((frame, ()) for frame in frames)
     with _message_writer(p, result_mcap) as messages:
-        for frame in timers.each("read", frames):
+        for frame, sights in timers.each("read", looked):
             with timers.phase("filter"):
                 began = time.perf_counter_ns()
                 belief = tracker.predict(rng, belief, frame.odometry, frame.odometry_gap_s)
                 scan, seen = labelled_scan(frame), None
                 # an image is looked at only for an update: most scans need none
                 if p.sight is not None and tracker.wants(belief, scan):
-                    seen = p.sight.labels_of(frame)
+                    ahead.restart(frame.odometry)
+                    seen = p.sight.labels_of(frame, sights)
                     scan = labelled_scan(replace(frame, labels=seen.labels))
                 scan = apply_filters(filters, scan, belief.estimate())
                 belief, info = tracker.update(rng, belief, scan)

@@ -20,6 +20,7 @@ from wallkit.report.html import write_comparison, write_report
 Seeds = Sequence[tuple[RunRecord, Evaluation]]
 
 COMPARED = ("ate_rmse_m", "heading_error_mean_deg")
+COMPARED_IN_PAPERS = ("error_mean_m", "updates_to_converge")
 
 
 def write_run_report(path: Path, record: RunRecord, evaluation: Evaluation, settings: EvaluateSettings) -> None:
@@ -75,8 +76,12 @@ def compare_runs(
     settings: EvaluateSettings,
     *,
     seed: int,
+    keys: Sequence[str] = COMPARED,
 ) -> CompareData:
     """Several configurations side by side, each one run or several seeds of it, with tests of significance.
+
+    Args:
+        keys: what is tested, over the same seeds.
 
     Raises:
         WallkitError: fewer than two.
@@ -92,7 +97,7 @@ def compare_runs(
     rng = np.random.default_rng(np.random.SeedSequence(seed))
     differences = []
     for name, seeds in zip(names[1:], runs[1:], strict=True):
-        for comparison in _differences(rng, runs[0], seeds):
+        for comparison in _differences(rng, runs[0], seeds, keys):
             differences.append((names[0], name, comparison))
     best = _best_of(contenders)
     return CompareData(" against ".join(names), best, tuple(contenders), tuple(differences))
@@ -103,11 +108,11 @@ def write_compare_report(path: Path, data: CompareData) -> None:
     write_comparison(path, data)
 
 
-def _differences(rng: np.random.Generator, a: Seeds, b: Seeds) -> Iterator[Comparison]:
+def _differences(rng: np.random.Generator, a: Seeds, b: Seeds, keys: Sequence[str]) -> Iterator[Comparison]:
     """Metric by metric over the same seeds, or scan by scan for single runs of one log."""
     errors_a, errors_b = a[0][1].errors, b[0][1].errors
     if len(a) > 1 and len(a) == len(b):
-        for key in COMPARED:
+        for key in keys:
             left, right = _values(key, a), _values(key, b)
             if len(left) == len(right) == len(a):
                 yield compare_seeds(rng, left, right)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -21,16 +20,16 @@ from wallkit.pipelines.cameras import ORACLE_MODEL, Camera, CameraRequest, find_
 from wallkit.points.filters import PointsSettings
 from wallkit.points.look import ClassesAt, Look, LookSettings, look, project_frame
 from wallkit.points.outlines import classes_by_outlines
+from wallkit.segment.ahead import Seen, look_ahead
 
 if TYPE_CHECKING:
     from wallkit.segment.settings import SegmentSettings
 
-# segmented images that are held: scans may be more frequent than images
-_IMAGES_HELD = 4
 # labels of so many scans are held for the next seed: some 250 MB at 1,080 beams
 _SCANS_HELD = 4096
 # so many scans may be without an image, or without anything that counts as kept, before that is an error
 PATIENCE = 20
+Sights = tuple[Seen, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +49,7 @@ class Labelled:
     Attributes:
         labels: None where no image belongs to the scan.
         glances: of each camera; not held for later seeds.
-        cost_ms: of decoding and segmenting the images. owed_ms: what of it was spent for an earlier seed.
+        cost_ms: of decoding and segmenting the images. owed_ms: what of it was spent ahead, or for an earlier seed.
     """
 
     labels: BeamLabels | None
@@ -68,6 +67,7 @@ class Sight:
         roles: what the model's classes count as, in its order; classes: these, each once: those of BeamLabels.
         T_lidar_base: (4, 4). kept: classes of which something must be seen. may_fall_back: see CameraRequest.
         holds_scans: whether labels are kept for the next seed; their cost is then counted again.
+        rate_hz: images of each camera that are looked at in a second at most; 0: all that are needed.
     """
 
     cameras: tuple[Camera, ...]
@@ -80,10 +80,11 @@ class Sight:
     may_fall_back: bool = False
     holds_scans: bool = False
     log_name: str = ""
+    rate_hz: float = 0.0
     classes: tuple[str, ...] = field(init=False)
     _class_of: Int64Array = field(init=False)
-    _images: OrderedDict[tuple[str, int], tuple[Segmentation, float]] = field(default_factory=OrderedDict)
-    _scans: OrderedDict[int, Labelled] = field(default_factory=OrderedDict)
+    _costs_ms: dict[tuple[str, int], float] = field(default_factory=dict)
+    _scans: dict[int, Labelled] = field(default_factory=dict)
     _asked: int = 0
     _without_image: int = 0
     _without_kept: int = 0
@@ -92,42 +93,57 @@ class Sight:
         self.classes = tuple(dict.fromkeys(self.roles))
         self._class_of = np.array([*(self.classes.index(role) for role in self.roles), -1])
 
-    def labels_of(self, frame: Frame) -> Labelled:
+    def ahead(self, frames: Iterable[Frame], is_needed: Callable[[Frame], bool]) -> Iterator[tuple[Frame, Sights]]:
+        """Each frame with what its images show, segmented in another thread while the filter works on those before."""
+
+        def is_new(frame: Frame) -> bool:
+            return is_needed(frame) and frame.stamp_ns not in self._scans
+
+        return look_ahead(frames, self._looked, rate_hz=self.rate_hz, is_needed=is_new)
+
+    def labels_of(self, frame: Frame, sights: Sights = ()) -> Labelled:
         """What the cameras say about a frame's returns.
+
+        Args:
+            sights: of `ahead`. An image that is not among them is segmented here, unless it was skipped by rate.
 
         Raises:
             LogError: none of the first scans has an image. ModelError: none of the first images shows what is kept.
         """
         if frame.stamp_ns in self._scans:
             return self._scans[frame.stamp_ns]
-        glances, cost_ms = [], 0.0
+        glances, cost_ms, owed_ms = [], 0.0, 0.0
         for camera in self.cameras:
             view = next((v for v in frame.views if v.topic == camera.topic), None)
             if view is None:
                 continue
-            segmentation, ms = self._segmented(view)
-            cost_ms += ms
+            segmentation = next((s.segmentation for s in sights if s.topic == camera.topic), None)
+            was_ahead = segmentation is not None
+            if segmentation is None and not self.rate_hz:
+                segmentation = self._looked(view.image)
+            # an image that the scan before had too has cost nothing more
+            spent_ms = self._costs_ms.pop((view.image.frame_id, view.image.stamp_ns), 0.0)
+            cost_ms, owed_ms = cost_ms + spent_ms, owed_ms + (spent_ms if was_ahead else 0.0)
+            if segmentation is None:
+                continue
             located = project_frame(camera.calibration, frame, view, self.T_lidar_base, self.settings)
             seen = look(located, self._classes_at(segmentation), self._class_of, len(self.classes))
             glances.append(Glance(camera, view, segmentation, seen))
-        found = Labelled(_merged(frame, glances, self.classes), tuple(glances), cost_ms)
+        found = Labelled(_merged(frame, glances, self.classes), tuple(glances), cost_ms, owed_ms)
         self._check(found)
         if self.holds_scans and len(self._scans) < _SCANS_HELD:
             self._scans[frame.stamp_ns] = Labelled(found.labels, (), cost_ms, cost_ms)
         return found
 
-    def _segmented(self, view: View) -> tuple[Segmentation, float]:
-        """The image's segmentation, and what it cost [ms]; 0 for an image that the scan before had too."""
-        key = view.topic, view.image.stamp_ns
-        if key in self._images:
-            return self._images[key][0], 0.0
+    def _looked(self, image: CameraImage) -> Segmentation | None:
+        """The image's segmentation, its cost remembered; None where it cannot be read."""
         began = time.perf_counter_ns()
-        segmentation = self.segment(view.image)
-        cost_ms = (time.perf_counter_ns() - began) / 1e6
-        self._images[key] = segmentation, cost_ms
-        while len(self._images) > _IMAGES_HELD * len(self.cameras):
-            self._images.popitem(last=False)
-        return segmentation, cost_ms
+        try:
+            return self.segment(image)
+        except LogError:
+            return None
+        finally:
+            self._costs_ms[image.frame_id, image.stamp_ns] = (time.perf_counter_ns() - began) / 1e6
 
     def _classes_at(self, segmentation: Segmentation) -> ClassesAt:
         if self.settings.lookup == "pixels":
@@ -195,6 +211,7 @@ def sight_of(
         may_fall_back=request.may_fall_back,
         holds_scans=holds_scans,
         log_name=log.name,
+        rate_hz=segment.rate_hz,
     )
 
 
