@@ -27,7 +27,16 @@ from wallkit.pipelines.simulate_camera import camera_info
 from wallkit.pipelines.simulate_play import START_NS
 from wallkit.pipelines.simulate_sensors import leaning
 from wallkit.pipelines.simulate_units import unit_of
-from wallkit.simulate.board_room import BOARD, STAND, BoardPoses, board_room, held_boards, stand_under
+from wallkit.simulate.board_room import (
+    BEHIND_IN_CLOUDS_M,
+    BEHIND_M,
+    BOARD,
+    STAND,
+    BoardPoses,
+    board_room,
+    held_boards,
+    stand_under,
+)
 from wallkit.simulate.camera import Unit, photograph
 from wallkit.simulate.gl import backend
 from wallkit.simulate.looks import Surface, Wardrobe
@@ -122,10 +131,11 @@ def captures(request: BoardRequest, robot: Robot, unit: Unit, *, each: int = _HE
     T_map_optical = T_map_base @ unit.T_base_true
     T_board_body = np.eye(4)
     T_board_body[:3, 3] = plate.mean(axis=0)
+    behind_m = BEHIND_M if request.rings is None else BEHIND_IN_CLOUDS_M
     scene = Scene(world)
     with contextlib.closing(Studio(wardrobe, fine=_FINE)) as studio:
         for number, T_map_board in enumerate(held):
-            bodies = {BOARD: T_map_board @ T_board_body, STAND: stand_under(T_map_board, plate)}
+            bodies = {BOARD: T_map_board @ T_board_body, STAND: stand_under(T_map_board, plate, behind_m)}
             scene.place(bodies)
             studio.place(bodies)
             for k in range(each):

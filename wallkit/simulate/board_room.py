@@ -17,8 +17,8 @@ BOARD, STAND = "board", "stand"
 _THICK_M = 0.008
 _TRIES = 1500
 _FEWEST_RINGS = 4
-# the post is so far behind the plate that nobody takes them for one thing
-_BEHIND_M = 0.35
+# how far behind the plate its post is: hidden by it from a planar LiDAR, as good as always; apart from it in a cloud
+BEHIND_M, BEHIND_IN_CLOUDS_M = 0.08, 0.35
 _ROOM_M, _HEIGHT_M = 8.0, 2.8
 
 
@@ -109,12 +109,12 @@ def held_boards(
     )
 
 
-def stand_under(T_map_board: Float64Array, plate: Float64Array) -> Float64Array:
+def stand_under(T_map_board: Float64Array, plate: Float64Array, behind_m: float = BEHIND_M) -> Float64Array:
     """T_map_stand (4, 4): a post behind all of the plate, as high as its middle, so that it hides nothing of it."""
     corners = plate @ T_map_board[:3, :3].T + T_map_board[:3, 3]
     middle = corners.mean(axis=0)
     away = T_map_board[:2, 2] / max(float(np.hypot(*T_map_board[:2, 2])), 1e-9)
-    depth = float(((corners - middle)[:, :2] @ away).max()) + _BEHIND_M
+    depth = float(((corners - middle)[:, :2] @ away).max()) + behind_m
     x, y = middle[:2] + depth * away
     return upright(float(x), float(y), 0.0, float(middle[2]))
 
