@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from wallkit.cli import common
+from wallkit.cli.up_camera import camera_from_flags, up_camera_options
 
 if TYPE_CHECKING:
     from wallkit.logs.rig import Wanted
@@ -23,7 +24,9 @@ topic_options = common.options(
     click.option("--odom", metavar="TOPIC", help='Odometry topic or transform "odom->base_link".'),
     click.option("--base-frame", metavar="FRAME", help="Frame that odometry moves, when its messages do not say."),
     click.option("--lidar-pose", metavar="X,Y,YAW", help="LiDAR on the robot [m, rad]; also X,Y,Z,ROLL,PITCH,YAW."),
-    click.option("--urdf", type=click.Path(path_type=Path), metavar="FILE", help="Robot description to take it from."),
+    click.option(
+        "--urdf", type=click.Path(path_type=Path), metavar="FILE", help="Robot description to take poses from."
+    ),
 )
 
 
@@ -58,11 +61,15 @@ camera_options = common.options(
     help="Map; else wallkit.toml's, else the log's.",
 )
 @click.option(
+    "--ceiling", type=click.Path(path_type=Path), metavar="FILE", help="Ceiling: with a map fused with it, else alone."
+)
+@click.option(
     "--init", metavar="WHERE", help="X,Y,YAW | topic | truth | global | everywhere  [default: topic, else global]"
 )
 @click.option("--truth", metavar="TOPIC|FILE.tum", help='True poses, if not found by name; also "map->base_link".')
 @topic_options
 @camera_options
+@up_camera_options
 @click.option("--start", type=float, metavar="S", help="Begin so many seconds after the first scan.")
 @click.option("--end", type=float, metavar="S", help="End so many seconds after the first scan.")
 @click.option("--particles", type=int, metavar="N", help="Particles (localize.particles).")
@@ -96,6 +103,8 @@ def localize(ctx: click.Context, /, logs: tuple[Path, ...], **flags: Any) -> Non
       wallkit localize bag/ --map floor.yaml --lidar-pose 0.2,0,0 --set localize.particles=5000
       wallkit localize log.mcap --map floor.yaml --filter line_fit
       wallkit localize log.mcap --map floor.yaml --filter wall_mask --calib front.toml --model walls.onnx --overlay 4
+      wallkit localize log.mcap --ceiling ceiling.yaml --init everywhere
+      wallkit localize log.mcap --map floor.yaml --ceiling ceiling.yaml
       wallkit localize log.mcap --map floor.yaml --out - --format tum > poses.tum
     """
     from wallkit.evaluate.resources import mark_now
@@ -144,6 +153,8 @@ def request_from_flags(logs: tuple[Path, ...], flags: dict[str, Any]) -> Any:
         end_s=flags["end"],
         wanted=wanted_from_flags(flags),
         cameras=cameras_from_flags(flags),
+        ceiling=flags["ceiling"],
+        camera=camera_from_flags(flags),
     )
 
 
@@ -303,6 +314,12 @@ def _say_plan(prepared: Prepared, out: Path) -> None:
     click.echo(f"reads    {p.log.name} ({', '.join(p.log.formats)}): {p.rig.scan.topic}, {p.rig.odometry}")
     click.echo(f"mount    {p.rig.mount.source}")
     click.echo(f"map      {p.map.grid.source}: {width} x {height} cells of {p.map.fields.resolution_m:g} m")
+    if p.overhead is not None:
+        across, along = p.overhead.ceiling.size_m
+        how = "alone" if p.overhead.is_alone else "beside the LiDAR"
+        click.echo(
+            f"ceiling  {p.overhead.path}: {across:.1f} x {along:.1f} m, seen by {p.overhead.up.channel.topic}, {how}"
+        )
     click.echo(f"start    {start}; truth: {'yes' if p.truth is not None else 'no'}")
     click.echo(f"filter   {p.config.localize.tracker}, {p.config.localize.particles} particles")
     if p.config.points.filters:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from wallkit.core.ceiling import CeilingMap
 from wallkit.core.geometry import compose, invert
 from wallkit.core.types import FieldSet, Float32Array, Float64Array, Points
 
@@ -19,7 +20,7 @@ def bordered(field: Float32Array) -> Float32Array:
     return np.ascontiguousarray(np.pad(field, BORDER, mode="edge"))
 
 
-def placed(fields: FieldSet, poses: Float64Array, *, border: int = BORDER) -> Float32Array:
+def placed(fields: FieldSet | CeilingMap, poses: Float64Array, *, border: int = BORDER) -> Float32Array:
     """Poses (N, 3) of frame map as the kernels take them: (4, N) float32 of cos and sin of the yaw, x and y in cells.
 
     A point with floor(x) = column lies in that column: the origin is the corner of cell (0, 0), not its centre

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from wallkit.core.ceiling import CeilingView
 from wallkit.core.geometry import compose
 from wallkit.core.types import Estimate, Float64Array, Mode
+from wallkit.localize.ceiling_eye import Light
 from wallkit.localize.health import Evidence, Trust
 from wallkit.localize.particles import Particles
 from wallkit.localize.recovery import Memory
@@ -33,6 +35,8 @@ class Belief:
         trust, memory: of health and recovery.
         path_m: driven since the last update. gap_s: longest silence of the odometry since then.
         updates: how many there were.
+        looked: T_odom_base (3,) where the last view of the ceiling counted; None before. sight: that view, lit, from there.
+        light: what was learned of the light.
     """
 
     particles: Particles
@@ -47,6 +51,9 @@ class Belief:
     path_m: float = 0.0
     gap_s: float = 0.0
     updates: int = 0
+    looked: Float64Array | None = None
+    sight: CeilingView | None = None
+    light: Light = Light()
 
     def estimate(self, stamp_ns: int = 0) -> Estimate:
         """Where the robot is now: the last answer carried on by odometry."""

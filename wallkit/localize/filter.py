@@ -9,10 +9,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wallkit.core.ceiling import CeilingMap, CeilingSight, CeilingView
 from wallkit.core.geometry import compose, relative
 from wallkit.core.raycast import classify_rays
 from wallkit.core.types import FieldSet, Float64Array, Health, Int8Array, LabelledScan, Mode, StampedPose
 from wallkit.localize.belief import Answer, Belief, StepInfo
+from wallkit.localize.ceiling_eye import CeilingEyes, ceiling_eyes
 from wallkit.localize.estimate import ESTIMATORS, find_modes, near_pose
 from wallkit.localize.health import (
     Trust,
@@ -46,13 +48,14 @@ class MonteCarloLocalizer:
     fields: FieldSet
     likelihood: Likelihood
     recovery: BoundRecovery
+    eyes: CeilingEyes | None = None
 
     def start(self, rng: np.random.Generator, at: StampedPose | str) -> Belief:
         """A belief about a given pose, or spread as `global` or `everywhere` say."""
         n = self.settings.particles
         poses = around_pose(rng, at, n) if isinstance(at, StampedPose) else SPREADS[at](rng, self.fields, n)
         particles = equally_weighted(poses)
-        pose, covariance, modes = self._answer(particles)
+        pose, covariance, modes = self.answer(particles)
         trust = (
             Trust(Health.UNCERTAIN, "a start pose was given", is_confirmed=True)
             if isinstance(at, StampedPose)
@@ -75,6 +78,22 @@ class MonteCarloLocalizer:
     def wants(self, belief: Belief, scan: LabelledScan) -> bool:
         """Whether `update` will use the scan: enough motion, or a scan that the belief does not explain."""
         return belief.is_due or self._contradicts(belief, scan)
+
+    def look(self, belief: Belief, sight: CeilingSight) -> Belief:
+        """The belief with a view of the ceiling counted in, at any time between two updates; see CeilingEyes.
+
+        Particles stay where they were at the last update: the view is seen from there, as far as odometry says.
+        """
+        if self.eyes is None or belief.odometry is None or not self.eyes.is_new(belief.looked, sight.odometry):
+            return belief
+        view = sight.view.seen_from(relative(belief.odometry, sight.odometry))
+        light = self.eyes.learned(belief.light, belief.particles, view)
+        view = self.eyes.lit(view, light)
+        exponent = 1.0 if belief.trust.is_confirmed else self.settings.caution
+        log_p = self.eyes.likelihood.log_likelihood(belief.particles.poses, view)
+        particles = Particles(belief.particles.poses, belief.particles.log_weights + exponent * log_p)
+        lit = self.eyes.lit(sight.view, light)
+        return replace(belief, particles=particles, looked=sight.odometry, sight=lit, light=light)
 
     def update(self, rng: np.random.Generator, belief: Belief, scan: LabelledScan) -> tuple[Belief, StepInfo]:
         """The belief after a scan, and what the update did; without enough motion the belief as it was."""
@@ -101,7 +120,7 @@ class MonteCarloLocalizer:
         assert belief.odometry is not None  # predict() comes first
         outcome = self.recovery.recover(
             rng,
-            self._resampled(rng, answer.particles, belief.updates),
+            self.resampled(rng, answer.particles, belief.updates),
             belief.memory,
             Situation(
                 points=scan.points,
@@ -112,6 +131,7 @@ class MonteCarloLocalizer:
                 was_confirmed=belief.trust.is_confirmed,
                 is_ripe=is_ripe(s.health, trust, evidence),
                 is_fitting=trust.good >= 2,
+                ceiling=self._sight_from_here(belief),
             ),
         )
         seeks = self.recovery.seeks_rivals
@@ -134,6 +154,9 @@ class MonteCarloLocalizer:
             trust=trust,
             memory=outcome.memory,
             updates=belief.updates + 1,
+            looked=belief.looked,
+            sight=belief.sight,
+            light=belief.light,
         )
         return after, info
 
@@ -147,6 +170,12 @@ class MonteCarloLocalizer:
         known = np.array([mode.pose for mode in here])
         others = [place for place in places if not near_pose(known, place.pose).any()]
         return (*here, *(Mode(place.pose, covariance, 0.0) for place in others))
+
+    def _sight_from_here(self, belief: Belief) -> CeilingView | None:
+        """The last view of the ceiling, as seen from where the robot is now."""
+        if belief.sight is None or belief.looked is None or belief.odometry is None:
+            return None
+        return belief.sight.seen_from(relative(belief.odometry, belief.looked))
 
     def _weighed(self, belief: Belief, scan: LabelledScan) -> Particles:
         """The particles with the scan counted in."""
@@ -188,7 +217,8 @@ class MonteCarloLocalizer:
             self.fields, scan.points, pose, tolerance_m=h.hit_tolerance_m, tolerance_per_m=h.hit_tolerance_per_m
         )
 
-    def _answer(self, particles: Particles) -> tuple[Float64Array, Float64Array, tuple[Mode, ...]]:
+    def answer(self, particles: Particles) -> tuple[Float64Array, Float64Array, tuple[Mode, ...]]:
+        """Pose (3,), covariance (3, 3) and every hypothesis of weighted particles."""
         weights = normalised(particles.log_weights)
         modes = find_modes(particles.poses, weights)
         pose, covariance = ESTIMATORS[self.settings.estimator](particles.poses, weights, modes)
@@ -196,7 +226,7 @@ class MonteCarloLocalizer:
 
     def _judged(self, particles: Particles, scan: LabelledScan) -> Answer:
         """What the particles answer, and what the scan says about it."""
-        pose, covariance, modes = self._answer(particles)
+        pose, covariance, modes = self.answer(particles)
         evidence = weigh_evidence(self._rays_at(scan, pose), np.sqrt(np.diag(covariance)), modes)
         return Answer(particles, pose, covariance, modes, evidence)
 
@@ -222,7 +252,8 @@ class MonteCarloLocalizer:
             and near_by.evidence.hit >= slip.fit_of_usual * trust.usual_hits
         )
 
-    def _resampled(self, rng: np.random.Generator, particles: Particles, updates: int) -> Particles:
+    def resampled(self, rng: np.random.Generator, particles: Particles, updates: int) -> Particles:
+        """The particles drawn anew, if it is time."""
         s, weights = self.settings, normalised(particles.log_weights)
         needed = {
             "ess": effective_size(weights) < s.resample_below * len(particles),
@@ -238,11 +269,19 @@ class MonteCarloLocalizer:
         return equally_weighted(poses)
 
 
-def monte_carlo_localizer(settings: LocalizeSettings, fields: FieldSet) -> MonteCarloLocalizer:
-    """The filter for one map, its look-up tables prepared."""
+def monte_carlo_localizer(
+    settings: LocalizeSettings, fields: FieldSet, ceiling: CeilingMap | None = None
+) -> MonteCarloLocalizer:
+    """The filter for one map, and the ceiling over it if there is one, its look-up tables prepared.
+
+    Raises:
+        MapError: see ceiling_eyes.
+    """
+    eyes = None if ceiling is None else ceiling_eyes(settings.ceiling, ceiling, threads=settings.threads)
     return MonteCarloLocalizer(
         settings,
         fields,
         settings.sensor.on(fields, threads=settings.threads),
-        settings.recovery.on(fields),
+        settings.recovery.on(fields, tell_apart=None if eyes is None else eyes.tell_apart),
+        eyes,
     )

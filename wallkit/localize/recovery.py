@@ -6,12 +6,13 @@ likelihood drops (Thrun, Burgard & Fox 2005, table 8.3); `none` leaves the parti
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, Protocol
 
 import numpy as np
 
+from wallkit.core.ceiling import CeilingView
 from wallkit.core.config import setting
 from wallkit.core.geometry import compose, relative, transform_points, wrap_angle
 from wallkit.core.grid import spread_of
@@ -24,10 +25,11 @@ from wallkit.localize.search import Place, SearchMap, find_places, prepare_searc
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """Points (K, 2) in frame base, and T_odom_base (3,) where they were seen."""
+    """Points (K, 2) in frame base, T_odom_base (3,) where they were seen, and what the ceiling looked like from there."""
 
     odometry: Float64Array
     points_m: Float64Array
+    ceiling: CeilingView | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +59,8 @@ class Situation:
         fit: share of the returns that the map explains.
         is_confirmed: the hypothesis is trusted. was_confirmed: it was before this update.
         is_ripe: it could be confirmed if there is no rival. is_fitting: the last updates spoke for it.
+        ceiling: what a camera saw of it last, from here; None without one.
+        likelihood: of poses (N, 3) by the present view alone, (N,) [nat]; None where nobody offers it.
     """
 
     points: Points
@@ -67,6 +71,8 @@ class Situation:
     was_confirmed: bool
     is_ripe: bool
     is_fitting: bool
+    ceiling: CeilingView | None = None
+    likelihood: Callable[[Float64Array], Float64Array] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,11 +85,19 @@ class Outcome:
     injected: int = 0
 
 
+# places, odometry now, and (odometry, view of the ceiling) of the last moments -> the places that are left
+TellApart = Callable[[Sequence[Place], Float64Array, Sequence[tuple[Float64Array, CeilingView]]], Sequence[Place]]
+
+
 class Recovery(Protocol):
     """Settings of a recovery."""
 
-    def on(self, fields: FieldSet) -> BoundRecovery:
-        """The recovery on one map."""
+    def on(self, fields: FieldSet, *, tell_apart: TellApart | None = None) -> BoundRecovery:
+        """The recovery on one map.
+
+        Args:
+            tell_apart: leaves out the places that another sensor than the LiDAR rules out.
+        """
         ...
 
 
@@ -120,9 +134,9 @@ class Relocalise:
     views_to_confirm: int = setting(3, "views without which nothing is confirmed", low=1)
     wait_views_max: int = setting(16, "most views between two searches", low=1)
 
-    def on(self, fields: FieldSet) -> BoundRecovery:
+    def on(self, fields: FieldSet, *, tell_apart: TellApart | None = None) -> BoundRecovery:
         """See Recovery."""
-        return _Relocaliser(self, fields)
+        return _Relocaliser(self, fields, tell_apart)
 
 
 @dataclass
@@ -130,6 +144,7 @@ class _Relocaliser:
     seeks_rivals: ClassVar[bool] = True
     settings: Relocalise
     fields: FieldSet
+    tell_apart: TellApart | None = None
     # the pyramid is built at the first search: a robot that never loses its way never pays for it
     _search_map: SearchMap | None = field(default=None, repr=False)
 
@@ -166,7 +181,9 @@ class _Relocaliser:
             transform_points(relative(odometry, view.odometry), view.points_m[:: max(1, len(view.points_m) // each)])
             for view in memory.views
         ]
-        return find_places(self._search_map, np.concatenate(stitched), keep=self.settings.keep)
+        places = find_places(self._search_map, np.concatenate(stitched), keep=self.settings.keep)
+        sights = [(view.odometry, view.ceiling) for view in memory.views if view.ceiling is not None]
+        return self.tell_apart(places, odometry, sights) if self.tell_apart and sights else places
 
     def _remembered(self, memory: Memory, now: Situation) -> tuple[Memory, bool]:
         """Memory with this view, if it is a new one; a hypothesis just given up takes its views with it."""
@@ -180,7 +197,7 @@ class _Relocaliser:
             if np.hypot(moved[0], moved[1]) < s.view_distance_m and abs(moved[2]) < np.deg2rad(s.view_turn_deg):
                 return replace(memory, views=views), False
         used = spread_of(now.points, s.points, range_max_m=s.range_max_m)
-        view = View(now.odometry, now.points.xyz_m[used, :2].astype(np.float64))
+        view = View(now.odometry, now.points.xyz_m[used, :2].astype(np.float64), now.ceiling)
         return replace(memory, views=(*views, view)[-s.views :]), True
 
     def _agrees(self, places: tuple[Place, ...], now: Situation) -> bool:
@@ -202,7 +219,7 @@ class _Relocaliser:
         which = rng.choice(len(places), count, p=odds)
         poses = np.array([place.pose for place in places])[which]
         poses += rng.standard_normal(poses.shape) * (s.sd_m, s.sd_m, np.deg2rad(s.sd_deg))
-        return _replaced(rng, particles, poses), count
+        return replaced(rng, particles, poses), count
 
 
 @dataclass(frozen=True)
@@ -216,7 +233,7 @@ class Augmented:
     alpha_fast: float = setting(0.5, "rate of the fast mean", low=0, high=1)
     share_max: float = setting(0.5, "largest share of the particles replaced at once", low=0, high=1)
 
-    def on(self, fields: FieldSet) -> BoundRecovery:
+    def on(self, fields: FieldSet, *, tell_apart: TellApart | None = None) -> BoundRecovery:
         """See Recovery."""
         return _AugmentedRecovery(self, fields)
 
@@ -238,7 +255,7 @@ class _AugmentedRecovery:
         count = round(len(particles) * min(s.share_max, max(0.0, 1.0 - fast / slow)))
         if count == 0:
             return Outcome(particles, memory)
-        return Outcome(_replaced(rng, particles, over_free_space(rng, self.fields, count)), memory, False, count)
+        return Outcome(replaced(rng, particles, over_free_space(rng, self.fields, count)), memory, False, count)
 
     def candidates(self, memory: Memory, odometry: Float64Array) -> Sequence[Place]:
         """See BoundRecovery."""
@@ -249,7 +266,7 @@ class _AugmentedRecovery:
 class NoRecovery:
     """Particles go only where odometry takes them; who does not look for rivals confirms nothing but by outliving them."""
 
-    def on(self, fields: FieldSet) -> BoundRecovery:
+    def on(self, fields: FieldSet, *, tell_apart: TellApart | None = None) -> BoundRecovery:
         """See Recovery."""
         return _NoRecovery()
 
@@ -267,7 +284,7 @@ class _NoRecovery:
         return ()
 
 
-def _replaced(rng: np.random.Generator, particles: Particles, poses: Float64Array) -> Particles:
+def replaced(rng: np.random.Generator, particles: Particles, poses: Float64Array) -> Particles:
     """Particles with randomly chosen ones replaced by poses (M, 3) of average weight."""
     kept, log_weights = particles.poses.copy(), np.log(np.maximum(normalised(particles.log_weights), 1e-300))
     at = rng.permutation(len(particles))[: len(poses)]

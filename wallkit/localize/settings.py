@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from wallkit.core.config import choice, component, section, setting
+from wallkit.localize.ceiling_settings import CeilingSettings
 from wallkit.localize.estimate import ESTIMATORS
 from wallkit.localize.health import HealthSettings
 from wallkit.localize.motion import MOTIONS, MotionModel
@@ -36,7 +37,9 @@ class EkfSettings:
 class LocalizeSettings:
     """The defaults are the ones of docs/benchmarks: one configuration for all logs."""
 
-    tracker: Literal["particle_filter", "ekf"] = setting("particle_filter", "the particle filter, or the EKF baseline")
+    tracker: Literal["particle_filter", "ekf", "ceiling"] = setting(
+        "particle_filter", "the particle filter, the EKF baseline, or the particle filter by the ceiling alone"
+    )
     particles: int = setting(2000, "particles at the start, and always when count is fixed", low=1)
     count: Literal["fixed", "kld"] = setting("fixed", "whether resampling may change their number")
     particles_min: int = setting(500, "fewest particles with KLD", low=1)
@@ -59,6 +62,7 @@ class LocalizeSettings:
     motion: MotionModel = component(MOTIONS, "differential", "how odometry errs")
     sensor: SensorModel = component(SENSORS, "class_conditional", "how likely a scan is at a pose")
     recovery: Recovery = component(RECOVERIES, "relocalise", "what is done when the estimate is not trusted")
+    ceiling: CeilingSettings = section(CeilingSettings, "the ceiling as a map, with --ceiling")
     slip: SlipSettings = section(SlipSettings, "the look around when a scan does not fit where odometry led")
     ekf: EkfSettings = section(EkfSettings, "the Kalman filter, when it is the tracker")
     health: HealthSettings = section(HealthSettings, "when the estimate is trusted")

@@ -15,7 +15,7 @@ from wallkit.logs.frames import FrameTree, fixed_transforms
 from wallkit.logs.reader import Log
 from wallkit.logs.topics import transform_topics
 
-POSE_HINT = "give it with --lidar-pose X,Y,YAW or X,Y,Z,ROLL,PITCH,YAW [m, rad]"
+_POSE_HINT = "give it with {} X,Y,YAW or X,Y,Z,ROLL,PITCH,YAW [m, rad]"
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,44 +26,54 @@ class Mount:
     source: str
 
 
-def find_mount(log: Log, base: str, lidar: str, *, words: str | None = None, urdf: Path | None = None) -> Mount:
-    """The LiDAR's place on the robot.
+def find_mount(
+    log: Log,
+    base: str,
+    sensor: str,
+    *,
+    words: str | None = None,
+    urdf: Path | None = None,
+    what: str = "LiDAR",
+    flag: str = "--lidar-pose",
+) -> Mount:
+    """The place of a LiDAR, or another sensor, on the robot.
 
     The user's words win, then the user's URDF; else a scan already in the base frame, /tf_static, transforms of /tf
     that never change, and a robot_description in the log, in this order.
 
     Args:
-        base: the frame whose motion odometry tells. lidar: the frame of the scans.
+        base: the frame whose motion odometry tells. sensor: the frame of what it measures.
         words: X,Y,YAW or X,Y,Z,ROLL,PITCH,YAW [m, rad], as typed.
+        what, flag: the sensor and the option for its pose, for messages.
 
     Raises:
         LogError: none of them knows it.
     """
     if words is not None:
-        return Mount(matrix_from_words(words), "--lidar-pose")
+        return Mount(matrix_from_words(words, flag), flag)
     if urdf is not None:
         transforms = transforms_from_urdf(urdf.read_text(encoding="utf-8"), str(urdf))
-        return Mount(FrameTree(transforms).lookup(base, lidar), str(urdf))
+        return Mount(FrameTree(transforms).lookup(base, sensor), str(urdf))
     if not base:
-        hint = f"{POSE_HINT}, then the frame is not needed; or name it with --base-frame"
+        hint = f"{_POSE_HINT.format(flag)}, then the frame is not needed; or name it with --base-frame"
         raise LogError(
             "odometry does not name the frame that moves (child_frame_id is empty)", where=log.name, hint=hint
         )
-    if base == lidar:
+    if base == sensor:
         return Mount(np.eye(4), f"scans are in the base frame '{base}'")
     known: set[str] = set()
     for source, transforms in _sources(log):
         tree = FrameTree(transforms)
-        matrix = tree.find(base, lidar)
+        matrix = tree.find(base, sensor)
         if matrix is not None:
             return Mount(matrix, source)
         known.update(tree.frames)
     listed = ", ".join(sorted(known)) or "none"
-    message = f"nothing tells where the LiDAR '{lidar}' sits on the robot '{base}'; known frames: {listed}"
-    raise LogError(message, where=log.name, hint=f"{POSE_HINT}, or name the robot's URDF")
+    message = f"nothing tells where the {what} '{sensor}' sits on the robot '{base}'; known frames: {listed}"
+    raise LogError(message, where=log.name, hint=f"{_POSE_HINT.format(flag)}, or name the robot's URDF")
 
 
-def matrix_from_words(words: str) -> Float64Array:
+def matrix_from_words(words: str, flag: str = "--lidar-pose") -> Float64Array:
     """(4, 4) transform of "X,Y,YAW" or "X,Y,Z,ROLL,PITCH,YAW" [m, rad], angles about fixed axes as in URDF.
 
     Raises:
@@ -74,7 +84,7 @@ def matrix_from_words(words: str) -> Float64Array:
     except ValueError:
         numbers = []
     if len(numbers) not in (3, 6) or not np.isfinite(numbers).all():
-        raise LogError(f"'{words}' is no pose", where="--lidar-pose", hint="X,Y,YAW or X,Y,Z,ROLL,PITCH,YAW [m, rad]")
+        raise LogError(f"'{words}' is no pose", where=flag, hint="X,Y,YAW or X,Y,Z,ROLL,PITCH,YAW [m, rad]")
     x, y, z, roll, pitch, yaw = numbers if len(numbers) == 6 else (*numbers[:2], 0.0, 0.0, 0.0, numbers[2])
     (cr, cp, cy), (sr, sp, sy) = np.cos((roll, pitch, yaw)), np.sin((roll, pitch, yaw))
     return np.array(

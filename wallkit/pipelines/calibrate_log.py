@@ -65,7 +65,7 @@ def gather_log(
     if images is None:
         raise CalibrationError("the log has no images", where=log.name, hint="record the camera's image topic too")
     stored = read_calibration(camera_file) if camera_file else None
-    camera = stored.camera if stored else _camera_of(log, images.topic)
+    camera = stored.camera if stored else camera_of(log, images.topic)
     moments, looked_at, left_out = _moments(log, images.topic, camera, board, done)
     if not moments:
         raise explain_nothing_found(_few_greys(log, images.topic, []), board, looked_at)
@@ -239,7 +239,7 @@ def _pair(name: str, moment: _Moment, scan: Scan | PointCloud) -> Pair:
     return Pair(name, moment.pose, None, scan.points_m.astype(np.float64), scan.rings, scan.stamp_ns)
 
 
-def _camera_of(log: Log, topic: str) -> Camera:
+def camera_of(log: Log, topic: str) -> Camera:
     """The camera_info that belongs to an image topic: of the same name space, or the only one."""
     infos = log.static.camera_infos
     stem = topic.rsplit("/", 1)[0]

@@ -27,6 +27,7 @@ class Config:
     """One table per room; `wallkit config show` prints it."""
 
     map: str = setting("", "map used when --map is not given; relative to this file")
+    ceiling: str = setting("", "ceiling used when --ceiling is not given; relative to this file")
     logs: SyncConfig = section(SyncConfig, "how messages become frames")
     maps: MapsSettings = section(MapsSettings, "how maps become fields")
     rules: Tolerances = section(Tolerances, "where the rules of `wallkit map validate` draw the line")
@@ -72,7 +73,7 @@ def load_config(path: Path | None, words: Sequence[str] = (), flags: dict[str, A
 
 def _with_files_beside(source: Source, path: Path) -> Source:
     """The source with its map and model named from here, not from the file's folder."""
-    table = _beside(source.table, "map", path)
+    table = _beside(_beside(source.table, "map", path), "ceiling", path)
     if isinstance(table.get("segment"), dict):
         table = {**table, "segment": _beside(table["segment"], "model", path)}
     return replace(source, table=table)

@@ -21,6 +21,7 @@ from wallkit.core.types import Estimate, Float64Array, StampedPose, Trajectory
 from wallkit.errors import ConfigError, LogError, WallkitError
 from wallkit.evaluate.resources import Mark, Timers, mark_now
 from wallkit.evaluate.tum import read_tum
+from wallkit.localize.ceiling_filter import CeilingLocalizer, ceiling_localizer
 from wallkit.localize.ekf import ScanMatchingEkf, scan_matching_ekf
 from wallkit.localize.filter import MonteCarloLocalizer, monte_carlo_localizer
 from wallkit.localize.initial import SPREADS
@@ -28,11 +29,13 @@ from wallkit.logs.loss import Loss
 from wallkit.logs.reader import Log, open_log
 from wallkit.logs.results import ResultWriter
 from wallkit.logs.rig import Rig, Wanted, find_rig
-from wallkit.logs.sync import SyncReport, synchronise
+from wallkit.logs.sync import SyncReport
 from wallkit.logs.topics import pick_initial_pose, pick_truth
 from wallkit.logs.trajectories import first_pose, trajectory_of
 from wallkit.pipelines.cameras import CameraRequest
+from wallkit.pipelines.ceiling_camera import CameraWords
 from wallkit.pipelines.config import Config
+from wallkit.pipelines.localize_ceiling import Overhead, alone, checked, find_overhead, frames_and_views, seen_by
 from wallkit.pipelines.maps import LoadedMap, load_map
 from wallkit.pipelines.need import UpdatesAhead
 from wallkit.pipelines.recorder import MessageWriter, Recorder
@@ -54,6 +57,7 @@ class Request:
         start_s, end_s: seconds from the first scan; None for all.
         wanted: topics and frames named by the user.
         cameras: what filters look through, when one of them needs a camera or a model is named.
+        ceiling: of a camera that looks up; with no map at all it is what the robot is localized by. camera: where that is.
     """
 
     logs: tuple[Path, ...]
@@ -65,6 +69,8 @@ class Request:
     end_s: float | None = None
     wanted: Wanted = field(default_factory=Wanted)
     cameras: CameraRequest = field(default_factory=CameraRequest)
+    ceiling: Path | None = None
+    camera: CameraWords = field(default_factory=CameraWords)
 
     def looks(self, config: Config) -> bool:
         """Whether cameras are used."""
@@ -89,6 +95,7 @@ class Prepared:
     window_ns: tuple[int | None, int | None]
     sight: Sight | None = None
     fallen_back: str = ""
+    overhead: Overhead | None = None
 
 
 @dataclass(frozen=True)
@@ -132,18 +139,23 @@ def prepare(request: Request, config: Config, *, seeds: int = 1) -> Prepared:
         WallkitError: something is missing; nothing has been computed or written yet.
     """
     log = open_log(request.logs)
-    rig = find_rig(log, request.wanted)
-    sight, config, fallen_back = _find_sight(log, rig, request, config, holds_scans=seeds > 1)
-    if sight is not None:
-        rig = replace(rig, cameras=tuple(camera.wanted for camera in sight.cameras))
     map_path = request.map or (Path(config.map) if config.map else None)
-    loaded = load_map(map_path, log, config.maps)
+    overhead = find_overhead(log, request.ceiling, request.camera, config, has_map=map_path is not None)
+    if overhead is not None and overhead.is_alone:
+        rig, loaded, config = alone(overhead, map_path, config)
+        sight, fallen_back = None, ""
+    else:
+        rig, loaded = find_rig(log, request.wanted), load_map(map_path, log, config.maps)
+        sight, config, fallen_back = _find_sight(log, rig, request, config, holds_scans=seeds > 1)
+        if sight is not None:
+            rig = replace(rig, cameras=tuple(camera.wanted for camera in sight.cameras))
+    loaded = checked(loaded, overhead)
     truth = _find_truth(log, request.truth)
     window = _window_ns(log, rig, request)
     start = _find_start(log, request, truth, rig, window)
     if isinstance(start, StampedPose):
         _check_on_map(start.pose, loaded)
-    return Prepared(request, config, log, rig, loaded, truth, start, window, sight, fallen_back)
+    return Prepared(request, config, log, rig, loaded, truth, start, window, sight, fallen_back, overhead)
 
 
 def localize(
@@ -169,7 +181,7 @@ def localize(
     belief: Any = tracker.start(rng, p.start)  # type: ignore[arg-type]  # _tracker refuses a spread for the EKF
     sync, recorder = SyncReport(), Recorder()
     watch = Watch(p.config.points, p.sight, moments)
-    frames = synchronise(p.log, p.rig, p.config.logs, report=sync, start_ns=p.window_ns[0], end_ns=p.window_ns[1])
+    frames, views = frames_and_views(p.log, p.rig, p.overhead, p.config, sync, p.window_ns)
     ahead = UpdatesAhead(p.config.localize)
     looked = p.sight.ahead(frames, ahead) if p.sight else ((frame, ()) for frame in frames)
     with _message_writer(p, result_mcap) as messages:
@@ -178,6 +190,8 @@ def localize(
                 began = time.perf_counter_ns()
                 belief = tracker.predict(rng, belief, frame.odometry, frame.odometry_gap_s)
                 scan, seen = labelled_scan(frame), None
+                # the ceiling is seen at any time between two scans: each sensor has a rate of its own
+                belief = seen_by(tracker, belief, views.until(frame.stamp_ns))
                 # an image is looked at only for an update: most scans need none
                 if p.sight is not None and tracker.wants(belief, scan):
                     ahead.restart(frame.odometry)
@@ -234,9 +248,12 @@ def _find_sight(
     return sight, config, ""
 
 
-def _tracker(p: Prepared) -> MonteCarloLocalizer | ScanMatchingEkf:
+def _tracker(p: Prepared) -> MonteCarloLocalizer | ScanMatchingEkf | CeilingLocalizer:
+    ceiling = None if p.overhead is None else p.overhead.ceiling
+    if p.config.localize.tracker == "ceiling" and ceiling is not None:
+        return ceiling_localizer(p.config.localize, p.map.fields, ceiling)
     if p.config.localize.tracker == "particle_filter":
-        return monte_carlo_localizer(p.config.localize, p.map.fields)
+        return monte_carlo_localizer(p.config.localize, p.map.fields, ceiling)
     if isinstance(p.start, str):
         raise ConfigError(
             "the Kalman filter cannot start without a pose", where="--init", hint="--init X,Y,YAW, or truth"

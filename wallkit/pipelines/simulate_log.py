@@ -23,6 +23,7 @@ from wallkit.logs.writer import McapWriter
 from wallkit.maps.read import load_map
 from wallkit.pipelines.outputs import result_folder
 from wallkit.pipelines.run_folder import sha256, write_json
+from wallkit.pipelines.simulate_ceiling import write_true_ceiling
 from wallkit.pipelines.simulate_jobs import Task, messages_of
 from wallkit.pipelines.simulate_play import START_NS, Message, Play, Sensor, Serialized
 from wallkit.pipelines.simulate_sensors import sensors_of
@@ -85,7 +86,7 @@ def prepare(request: LogRequest) -> Play:
 def simulate_log(
     request: LogRequest, out: Path, *, overwrite: bool = False, jobs: int = 1, progress: Progress = lambda _: None
 ) -> Simulated:
-    """A folder with log.mcap, truth.tum, manifest.json and the map the robot is given.
+    """A folder with log.mcap, truth.tum, manifest.json, the map the robot is given, and with cameras the ceiling.
 
     Args:
         jobs: processes that make pictures.
@@ -104,6 +105,8 @@ def simulate_log(
             counts = _write(file, _recorded(measured, play, progress))
         write_tum(folder / "truth.tum", Trajectory(play.stamps_ns[::5], play.poses[::5]))
         (folder / "map.wkmap.urdf").write_bytes(request.map_path.read_bytes())
+        if any(camera.pictures for camera in request.scenario.cameras):
+            write_true_ceiling(folder, play)
         steps = np.hypot(*np.diff(play.poses[:, :2], axis=0).T)
         dropped = {name: sensor.schedule.dropped for name, sensor in sensors.items()}
         done = Simulated(play.duration_s, counts, dropped, float(steps.sum()), len(play.people.agents))

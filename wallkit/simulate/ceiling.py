@@ -26,7 +26,7 @@ def ceiling_picture(
 
     Args:
         size_m: its extent in x and y; the picture's columns run along +x, its rows along +y, from the lowest corner.
-        lamps: (L, 4) x, y of the centres and extents of the lamps, from the lowest corner [m].
+        lamps: (L, 5) x, y of the centres and extents of the lamps, from the lowest corner [m], and whether each is on.
         px_per_m: less where the picture would be larger than 4096 pixels.
     """
     scale = min(px_per_m, _MOST_PX / max(size_m))
@@ -40,9 +40,27 @@ def ceiling_picture(
     for kind, every in _EVERY_M2.items():
         for _ in range(max(1, int(rng.poisson(area / every)))):
             _put(rng, pixels, scale, kind, rng.uniform((0, 0), size_m))
-    for x, y, w, h in lamps.tolist():
-        _lamp(pixels, scale, x, y, w, h)
+    for x, y, w, h, is_on in lamps.tolist():
+        _lamp(pixels, scale, (x, y, w, h), is_on=bool(is_on))
     return Texture(pixels, size_m)
+
+
+def painted_picture(rng: np.random.Generator, size_m: tuple[float, float], *, px_per_m: float = 60.0) -> Texture:
+    """A ceiling of colours that run into each other over metres, as the one the first ceiling localizer drove under.
+
+    Neighbouring places look almost alike, which is what a single pixel has to tell them by.
+    """
+    import cv2
+
+    scale = min(px_per_m, _MOST_PX / max(size_m))
+    width, height = (max(8, round(side * scale)) for side in size_m)
+    coarse = (max(8, round(size_m[1] * 2)), max(8, round(size_m[0] * 2)))
+    sheets = [
+        cv2.resize(fractal(rng, coarse, slope=1.6), (width, height), interpolation=cv2.INTER_CUBIC) for _ in range(3)
+    ]
+    hue, saturation, value = 180 * (0.5 + 0.28 * sheets[0]), 165 + 40 * sheets[1], 200 + 30 * sheets[2]
+    hsv = np.stack([hue % 180, np.clip(saturation, 60, 255), np.clip(value, 90, 255)], axis=2)
+    return Texture(np.asarray(cv2.cvtColor(hsv.astype(np.uint8), cv2.COLOR_HSV2RGB)), size_m)
 
 
 def lamps_of(rng: np.random.Generator, size_m: tuple[float, float]) -> Float64Array:
@@ -134,10 +152,11 @@ def _stain(rng: np.random.Generator, pixels: UInt8Array, scale: float, at: Float
     pixels[y0:y1, x0:x1] = (pixels[y0:y1, x0:x1] * tint).astype(np.uint8)
 
 
-def _lamp(pixels: UInt8Array, scale: float, x: float, y: float, w: float, h: float) -> None:
+def _lamp(pixels: UInt8Array, scale: float, box: tuple[float, float, float, float], *, is_on: bool) -> None:
     import cv2
 
-    for grow, rgb in ((0.03, (150, 150, 150)), (0.0, (255, 255, 252))):
+    x, y, w, h = box
+    for grow, rgb in ((0.03, (150, 150, 150)), (0.0, (255, 255, 252) if is_on else (172, 174, 176))):
         a = ((x - w / 2 - grow) * scale, (y - h / 2 - grow) * scale)
         b = ((x + w / 2 + grow) * scale, (y + h / 2 + grow) * scale)
         cv2.rectangle(pixels, tuple(map(int, a)), tuple(map(int, b)), rgb, -1)

@@ -14,7 +14,7 @@ import numpy as np
 
 from wallkit.core.config import setting
 from wallkit.core.types import Float64Array
-from wallkit.simulate.ceiling import ceiling_picture, lamps_of
+from wallkit.simulate.ceiling import ceiling_picture, lamps_of, painted_picture
 from wallkit.simulate.decals import picture
 from wallkit.simulate.panels import Panel
 from wallkit.simulate.textures import TEXTURES, Colour, Texture, colour
@@ -25,9 +25,12 @@ from wallkit.simulate.world import Solid, World
 class Looks:
     """How the world looks to cameras. What is not said is drawn from the seed."""
 
-    ceiling: Literal["unique", "repeating"] = setting(
-        "unique", "unique: no two places look the same; repeating: panels every 1.2 m, the hard case"
+    ceiling: Literal["unique", "repeating", "painted"] = setting(
+        "unique",
+        "unique: lamps, vents, stains, no two places look the same; repeating: panels every 1.2 m, the hard case; "
+        "painted: colours that run into each other",
     )
+    lamps_off: float = setting(0.0, "share of the ceiling's lamps that are switched off", low=0, high=1)
     walls: str = setting(
         "", "one surface for all walls: paint, plaster, tiles, brick, wainscot, concrete; else by room"
     )
@@ -170,6 +173,8 @@ class Wardrobe:
         if self.looks.ceiling == "repeating":
             grid = TEXTURES["ceiling_grid"]
             return self.kept("ceiling", lambda rng: Surface(grid(rng, colour(rng, 0.1, 0.02, 0.85)), glow=0.45))
+        if self.looks.ceiling == "painted":
+            return self.kept("ceiling", lambda rng: Surface(painted_picture(rng, size_m), fits=True, glow=0.45))
         return self.kept(
             "ceiling", lambda rng: Surface(ceiling_picture(rng, size_m, self.lamps(size_m)), fits=True, glow=0.45)
         )
@@ -177,8 +182,10 @@ class Wardrobe:
     # ------------------------------------------------------------------------------------------- light
 
     def lamps(self, size_m: tuple[float, float]) -> Float64Array:
-        """(L, 4) of `lamps_of` for this world's ceiling."""
-        return lamps_of(self.rng("lamps"), size_m)
+        """(L, 5) of `lamps_of` for this world's ceiling, and whether each is on."""
+        lamps = lamps_of(self.rng("lamps"), size_m)
+        is_on = self.rng("switches").random(len(lamps)) >= self.looks.lamps_off
+        return np.column_stack([lamps, is_on])
 
     def light_count(self, lamps: int) -> int:
         """How many lamps light a place at once."""
@@ -189,8 +196,8 @@ class Wardrobe:
         rng = self.rng("lights")
         warmth = float(rng.uniform(-1, 1))
         found = []
-        for x, y, *_ in self.lamps(size_m).tolist():
-            power = float(rng.uniform(0.75, 1.1))
+        for x, y, _, _, is_on in self.lamps(size_m).tolist():
+            power = float(rng.uniform(0.75, 1.1)) * is_on
             tint = np.clip((1 + 0.10 * warmth, 1.0, 1 - 0.16 * warmth), 0, 1.15) * power
             at = (float(corner[0] + x), float(corner[1] + y), self.world.height_m - 0.08)
             found.append(Lamp(at, tuple(tint.tolist())))

@@ -54,7 +54,7 @@ def read_spec(path: Path) -> tuple[RasterSpec, dict[str, int]]:
     Raises:
         MapError: see read_raster.
     """
-    table, lines = _read_yaml(path)
+    table, lines = read_yaml(path)
 
     def fail(key: str, message: str, hint: str) -> MapError:
         return MapError(message, where=f"{path}:{lines.get(key, 1)}", hint=hint)
@@ -65,7 +65,7 @@ def read_spec(path: Path) -> tuple[RasterSpec, dict[str, int]]:
     mode = str(table.get("mode", "trinary")).lower()
     if mode not in MODES:
         raise fail("mode", f"mode is '{mode}'", closest(mode, MODES))
-    resolution = _number(table["resolution"])
+    resolution = number_in(table["resolution"])
     if resolution is None or not resolution > 0:
         raise fail(
             "resolution",
@@ -73,14 +73,14 @@ def read_spec(path: Path) -> tuple[RasterSpec, dict[str, int]]:
             "metres per pixel, for example 0.05",
         )
     origin = table["origin"]
-    numbers = [_number(v) for v in origin] if isinstance(origin, list) else []
+    numbers = [number_in(v) for v in origin] if isinstance(origin, list) else []
     if len(numbers) != 3 or None in numbers:
         raise fail(
             "origin", f"origin is {origin!r}", "three numbers: [x, y, yaw] of the lower left corner, metres and radians"
         )
     thresholds = {}
     for key, default in (("occupied_thresh", OCCUPIED_THRESH), ("free_thresh", FREE_THRESH)):
-        value = _number(table.get(key, default))
+        value = number_in(table.get(key, default))
         if value is None or not 0 <= value <= 1:
             raise fail(key, f"{key} is {table.get(key)!r}", "a number between 0 and 1")
         thresholds[key] = value
@@ -163,7 +163,7 @@ def _oddities(path: Path, lines: dict[str, int], spec: RasterSpec, pixels: np.nd
         )
 
 
-def _read_yaml(path: Path) -> tuple[dict[str, Any], dict[str, int]]:
+def read_yaml(path: Path) -> tuple[dict[str, Any], dict[str, int]]:
     from ruamel.yaml import YAML
     from ruamel.yaml.error import YAMLError
 
@@ -200,7 +200,7 @@ def _read_image(image: Path, where: str) -> np.ndarray:
     return pixels
 
 
-def _number(value: Any) -> float | None:
+def number_in(value: Any) -> float | None:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return None
     return float(value) if math.isfinite(value) else None

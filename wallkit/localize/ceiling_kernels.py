@@ -1,0 +1,177 @@
+"""Particles x pixels -> how much colours differ: the loops of the ceiling's sensor models, compiled by Numba.
+
+As in `kernels`, lengths are in pixels of the map, poses come from `grid.placed`, and maps carry a border of one pixel, here
+one that is unseen. Pixels of a map lie together as (value, value, value, seen), 16 bytes: one look-up is one cache line.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+_f4 = np.float32
+_ZERO, _HALF, _ONE, _TWO = _f4(0.0), _f4(0.5), _f4(1.0), _f4(2.0)
+
+
+@njit(fastmath=True, inline="always")
+def _norm(a: Any, b: Any, c: Any, order: Any) -> Any:
+    """The norm of some order of three lengths >= 0; 1, 2 and 4, the usual ones, without a power."""
+    if order == _f4(4.0):
+        a, b, c = a * a, b * b, c * c
+        return _f4(math.sqrt(math.sqrt(a * a + b * b + c * c)))
+    if order == _f4(2.0):
+        return _f4(math.sqrt(a * a + b * b + c * c))
+    if order == _f4(1.0):
+        return a + b + c
+    return _f4((a**order + b**order + c**order) ** (_ONE / order))
+
+
+@njit(cache=True, fastmath=True, nogil=True)
+def colour_costs(
+    placed: Any, points: Any, colours: Any, order: Any, is_circle: Any, most: Any, unseen: Any, image: Any, out: Any
+) -> None:
+    """out[i] = mean_k min(|| colours[k] - image[pixel of point k seen from pose i] ||, most).
+
+    Args:
+        placed: (4, N) float32: cos and sin of the yaw, x and y in pixels (grid.placed).
+        points: (2, K) float32, in frame base, in pixels.
+        colours: (3, K) float32.
+        order: of the norm. is_circle: the first channel is a circle of circumference 1.
+        most: what a pixel can differ at most. unseen: what one counts that falls where the map is not known.
+        image: (H, W, 4) float32, C-contiguous, with a border of one unseen pixel.
+        out: (N,) float64, written.
+    """
+    height, width = image.shape[0], image.shape[1]
+    flat = image.reshape(-1, 4)
+    x_last, y_last, row = _f4(width - 1), _f4(height - 1), np.int32(width)
+    px, py, z0, z1, z2 = points[0], points[1], colours[0], colours[1], colours[2]
+    count = px.shape[0]
+    for i in range(placed.shape[1]):
+        c, s, x0, y0 = placed[0, i], placed[1, i], placed[2, i], placed[3, i]
+        total = _ZERO
+        for k in range(count):
+            x = min(max(x0 + c * px[k] - s * py[k], _ZERO), x_last)
+            y = min(max(y0 + s * px[k] + c * py[k], _ZERO), y_last)
+            cell = np.uint32(np.int32(y) * row + np.int32(x))
+            d0 = abs(z0[k] - flat[cell, 0])
+            if is_circle:
+                d0 = _TWO * min(d0, abs(_ONE - d0))
+            d = _norm(d0, abs(z1[k] - flat[cell, 1]), abs(z2[k] - flat[cell, 2]), order)
+            seen = flat[cell, 3]
+            total += seen * min(d, most) + (_ONE - seen) * unseen
+        out[i] = total / _f4(count)
+
+
+@njit(cache=True, fastmath=True, nogil=True)
+def exposed_costs(
+    placed: Any, points: Any, colours: Any, order: Any, limit: Any, most: Any, unseen: Any, image: Any, out: Any
+) -> None:
+    """As `colour_costs` of RGB, with the exposure g in [1 / limit, limit] of each pose that explains the view best.
+
+    g is the ratio of the summed brightness of view and map, twice more over the pixels that it explains: walls and lamps
+    that are off must not rule. The costs are those of colours / g.
+    """
+    height, width = image.shape[0], image.shape[1]
+    flat = image.reshape(-1, 4)
+    x_last, y_last, row = _f4(width - 1), _f4(height - 1), np.int32(width)
+    px, py, z0, z1, z2 = points[0], points[1], colours[0], colours[1], colours[2]
+    count = px.shape[0]
+    bright = _f4(0.299) * z0 + _f4(0.587) * z1 + _f4(0.114) * z2
+    cells, shade = np.empty(count, np.uint32), np.empty(count, np.float32)
+    for i in range(placed.shape[1]):
+        c, s, x0, y0 = placed[0, i], placed[1, i], placed[2, i], placed[3, i]
+        above, below = _f4(1e-6), _f4(1e-6)
+        for k in range(count):
+            x = min(max(x0 + c * px[k] - s * py[k], _ZERO), x_last)
+            y = min(max(y0 + s * px[k] + c * py[k], _ZERO), y_last)
+            cell = np.uint32(np.int32(y) * row + np.int32(x))
+            seen = flat[cell, 3]
+            shade[k] = seen * (_f4(0.299) * flat[cell, 0] + _f4(0.587) * flat[cell, 1] + _f4(0.114) * flat[cell, 2])
+            cells[k] = cell
+            above += seen * bright[k]
+            below += shade[k]
+        g = min(max(above / below, _ONE / limit), limit)
+        for _ in range(2):
+            above, below = _f4(1e-6), _f4(1e-6)
+            for k in range(count):
+                fits = _f4(abs(bright[k] - g * shade[k]) < most) * flat[cells[k], 3]
+                above += fits * bright[k]
+                below += fits * shade[k]
+            g = min(max(above / below, _ONE / limit), limit)
+        total, per = _ZERO, _ONE / g
+        for k in range(count):
+            cell = cells[k]
+            d0, d1 = abs(z0[k] * per - flat[cell, 0]), abs(z1[k] * per - flat[cell, 1])
+            d = _norm(d0, d1, abs(z2[k] * per - flat[cell, 2]), order)
+            seen = flat[cell, 3]
+            total += seen * min(d, most) + (_ONE - seen) * unseen
+        out[i] = total / _f4(count)
+
+
+@njit(cache=True, fastmath=True, nogil=True)
+def gradient_costs(
+    placed: Any, points: Any, values: Any, seen: Any, most: Any, unseen: Any, image: Any, out: Any
+) -> None:
+    """out[i] = mean over neighbours a, b of the grid of min(|(values[a] - m[a]) - (values[b] - m[b])|, most).
+
+    m is the image's first channel at the points seen from pose i: what is added to all values changes nothing.
+
+    Args:
+        points: (2, R, C) float32, in frame base, in pixels. values: (R, C) float32. seen: (R, C) float32 of 0 or 1.
+        placed, most, unseen, image, out: as `colour_costs`.
+    """
+    height, width = image.shape[0], image.shape[1]
+    flat = image.reshape(-1, 4)
+    x_last, y_last, row = _f4(width - 1), _f4(height - 1), np.int32(width)
+    px, py = points[0], points[1]
+    rows, columns = values.shape
+    above, is_above = np.zeros(columns, np.float32), np.zeros(columns, np.float32)
+    for i in range(placed.shape[1]):
+        c, s, x0, y0 = placed[0, i], placed[1, i], placed[2, i], placed[3, i]
+        total, count = _ZERO, _ZERO
+        for a in range(rows):
+            left, is_left = _ZERO, _ZERO
+            for b in range(columns):
+                x = min(max(x0 + c * px[a, b] - s * py[a, b], _ZERO), x_last)
+                y = min(max(y0 + s * px[a, b] + c * py[a, b], _ZERO), y_last)
+                cell = np.uint32(np.int32(y) * row + np.int32(x))
+                known = flat[cell, 3]
+                rest = values[a, b] - flat[cell, 0]
+                if b > 0:
+                    both = is_left * known
+                    weight = seen[a, b] * seen[a, b - 1]
+                    total += weight * (both * min(abs(rest - left), most) + (_ONE - both) * unseen)
+                    count += weight
+                if a > 0:
+                    both = is_above[b] * known
+                    weight = seen[a, b] * seen[a - 1, b]
+                    total += weight * (both * min(abs(rest - above[b]), most) + (_ONE - both) * unseen)
+                    count += weight
+                left, is_left = rest, known
+                above[b], is_above[b] = rest, known
+        out[i] = total / max(count, _ONE)
+
+
+@njit(cache=True, fastmath=True, nogil=True)
+def histogram_costs(placed: Any, offset: Any, roots: Any, unseen: Any, table: Any, out: Any) -> None:
+    """out[i] = 1 - sum_b roots[b] * table[cell of pose i, b]: one less the Bhattacharyya coefficient of two histograms.
+
+    Args:
+        offset: (2,) float32 of the view's middle in frame base, in cells. roots: (B,) float32 roots of its shares.
+        table: (H, W, B) float32 roots of the map's shares round every cell; all zeros where it is not known.
+        placed, unseen, out: as `colour_costs`.
+    """
+    height, width, bins = table.shape
+    for i in range(placed.shape[1]):
+        c, s = placed[0, i], placed[1, i]
+        x = placed[2, i] + c * offset[0] - s * offset[1]
+        y = placed[3, i] + s * offset[0] + c * offset[1]
+        column = min(max(np.int32(x), np.int32(0)), np.int32(width - 1))
+        line = min(max(np.int32(y), np.int32(0)), np.int32(height - 1))
+        same = _ZERO
+        for b in range(bins):
+            same += roots[b] * table[line, column, b]
+        out[i] = max(_ONE - same, _ZERO) if same > _ZERO else unseen
