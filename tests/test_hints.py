@@ -26,12 +26,6 @@ COMING = {
     "--board",
     "--image",
     "--model",
-    "model export",
-    "--print-setup",
-    "model train",
-    "model bench",
-    "model verify",
-    "model quantize",
 }
 _FLAG = re.compile(r"(?<![\w-])--[a-z][a-z-]+")
 

@@ -98,3 +98,41 @@ def test_bench_splits_the_time_and_judges_it(wallkit, oracle, pictures):
 def test_bench_of_a_fixed_size_cannot_take_another(wallkit, oracle):
     done = wallkit("model", "bench", oracle, "--sizes", "320")
     assert (done.code, "its input is 192 x 320, not 320 x 320" in done.err) == (2, True)
+
+
+def test_quantize_writes_what_still_sees_and_nothing_else(wallkit, tmp_path, pictures):
+    assert wallkit("model", "fixture", "stuff.onnx", "--imgsz", "192x320", "--layout", "class-scores").code == 0
+    words = ("model", "quantize", "stuff.onnx", "--images", pictures)
+    assert "would calibrate and judge with 2 pictures and write stuff-int8.onnx" in wallkit(*words, "--dry-run").out
+    done = wallkit(*words, "--json")
+    assert done.code == 0, done.err
+    assert (done.json["written"], done.json["judged_by_calibration_pictures"], done.json["match_share"]) == (
+        True,
+        True,
+        1.0,
+    )
+    assert wallkit("model", "inspect", "stuff-int8.onnx", "--json").json["is_quantised"]
+    assert wallkit(*words).code == 2
+    cv2.imwrite(str(tmp_path / "empty.png"), picture((180, 320), {}))
+    done = wallkit("model", "quantize", "stuff.onnx", "--images", "empty.png", "-o", "other.onnx")
+    assert (done.code, "so nobody can judge" in done.err) == (2, True)
+    assert not (tmp_path / "other.onnx").exists()
+
+
+def test_export_prints_the_set_up_and_says_what_it_lacks(wallkit, tmp_path):
+    done = wallkit("model", "export", "--print-setup")
+    assert done.code == 0
+    assert "pip install --no-deps ultralytics==" in done.out
+    done = wallkit("model", "export")
+    assert (done.code, "BEST.pt" in done.err) == (2, True)
+    (tmp_path / "best.pt").write_bytes(b"weights")
+    done = wallkit("model", "export", "best.pt", "--imgsz", "300")
+    assert (done.code, "the exporter would round it silently" in done.err) == (2, True)
+    python = tmp_path / "python"
+    python.write_text("#!/bin/sh\necho \"ModuleNotFoundError: No module named 'ultralytics'\" >&2\nexit 1\n")
+    python.chmod(0o755)
+    done = wallkit("model", "export", "best.pt", "--python", python, "--dry-run")
+    assert (done.code, f"would run {python} and write best.onnx (320x320)" in done.out) == (0, True)
+    done = wallkit("model", "export", "best.pt", "--python", python)
+    assert (done.code, "has no Ultralytics" in done.err) == (2, True)
+    assert not (tmp_path / "best.onnx").exists()

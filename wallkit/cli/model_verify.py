@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 FILE = click.Path(path_type=Path)
 _MOST_MOVES = 6
 _WHOLE = 0.999
+_MATCH, _IOU = 0.95, 0.9
+_NEITHER = "cannot tell: neither finds anything"
 
 picture_options = common.options(
     click.option("--count", type=click.IntRange(1), default=40, show_default=True, help="Pictures, evenly spread."),
@@ -38,10 +40,10 @@ picture_options = common.options(
     "--trust", is_flag=True, help="Load all that the checkpoint holds, not only weights: it may run anything."
 )
 @click.option(
-    "--min-match", type=click.FloatRange(0, 1), default=0.95, show_default=True, help="Least share of matched things."
+    "--min-match", type=click.FloatRange(0, 1), default=_MATCH, show_default=True, help="Least share of matched things."
 )
 @click.option(
-    "--min-iou", type=click.FloatRange(0, 1), default=0.9, show_default=True, help="Least mean IoU of their masks."
+    "--min-iou", type=click.FloatRange(0, 1), default=_IOU, show_default=True, help="Least mean IoU of their masks."
 )
 @common.config_option
 @common.set_option
@@ -78,11 +80,7 @@ def verify(ctx: click.Context, /, a: Path, b: Path, **flags: Any) -> None:
         click.echo("\n".join([*page(found, len(pictures)), f"verdict  {verdict}"]))
         if found.names:
             common.warn(f"only one side has the classes {', '.join(found.names[:8])}", quiet=flags["quiet"])
-    ctx.exit(
-        {"agree": common.OK, "cannot tell: neither finds anything": common.CANNOT_TELL}.get(
-            verdict, common.FAILED_CHECK
-        )
-    )
+    ctx.exit({"agree": common.OK, _NEITHER: common.CANNOT_TELL}.get(verdict, common.FAILED_CHECK))
 
 
 def pictures_from_flags(places: tuple[Path, ...], flags: dict[str, Any]) -> list[Any]:
@@ -95,45 +93,55 @@ def pictures_from_flags(places: tuple[Path, ...], flags: dict[str, Any]) -> list
 
 def page(found: Verified, pictures: int) -> list[str]:
     """What a person reads."""
-    total = found.agreement
-    lines = [f"things   {_things(total)}, on {pictures} pictures"]
-    if total.matched:
-        lines += [f"masks    {_masks(total)}", f"scores   {_scores(total)}"]
-        if total.worst[1] < _WHOLE:
-            lines.append(f"worst    {total.worst[0]}: {total.worst[1]:.2f} of it agrees")
-    ious = ", ".join(f"{role} {iou:.3f}" for role, iou in total.role_iou().items())
-    lines.append(f"roles    {ious or 'none seen'} (IoU of their pixels)")
-    lines.append(f"points   {_points(found)}")
+    lines = [f"looked   at {pictures} pictures", *agreement_page(found.agreement, has_lidar=found.has_lidar)]
     if found.rectangle is not None:
         said = f"{_things(found.rectangle)}, {_masks(found.rectangle)}"
         lines.append(f"predict  as Ultralytics runs the checkpoint by itself, with a rectangular letterbox: {said}")
     return [*lines, *(f"because  {cause}" for cause in found.causes)]
 
 
+def agreement_page(total: Agreement, *, has_lidar: bool) -> list[str]:
+    """How far two sides agree."""
+    lines = [f"things   {_things(total)}"]
+    if total.matched:
+        lines += [f"masks    {_masks(total)}", f"scores   {_scores(total)}"]
+        if total.worst[1] < _WHOLE:
+            lines.append(f"worst    {total.worst[0]}: {total.worst[1]:.2f} of it agrees")
+    ious = ", ".join(f"{role} {iou:.3f}" for role, iou in total.role_iou().items())
+    lines.append(f"roles    {ious or 'none seen'} (IoU of their pixels)")
+    return [*lines, f"points   {_points(total, has_lidar=has_lidar)}"]
+
+
 def document(found: Verified) -> dict[str, Any]:
     """What a program reads."""
     return {
-        **_numbers(found.agreement),
+        **agreement_numbers(found.agreement),
         "points_are_lidar": found.has_lidar,
         "causes": list(found.causes),
         "classes_of_one_side": list(found.names),
-        "rectangular_letterbox": None if found.rectangle is None else _numbers(found.rectangle),
+        "rectangular_letterbox": None if found.rectangle is None else agreement_numbers(found.rectangle),
     }
 
 
 # ------------------------------------------------------------------------------------------------ details
 
 
+def is_agreed(total: Agreement, min_match: float = _MATCH, min_iou: float = _IOU) -> bool:
+    """Whether the two sides agree well enough, or have nothing to differ in."""
+    return _verdict(total, min_match, min_iou) in ("agree", _NEITHER)
+
+
 def _verdict(total: Agreement, min_match: float, min_iou: float) -> str:
     if not max(total.of_a, total.of_b):
-        return "cannot tell: neither finds anything"
+        return _NEITHER
     if total.share < min_match:
         return f"differ: {total.share:.0%} of the things are matched, {min_match:.0%} were asked"
     mean = sum(total.ious) / len(total.ious) if total.ious else 0.0
     return "agree" if mean >= min_iou else f"differ: mean mask IoU {mean:.3f}, {min_iou:g} was asked"
 
 
-def _numbers(total: Agreement) -> dict[str, Any]:
+def agreement_numbers(total: Agreement) -> dict[str, Any]:
+    """How far two sides agree, for a program."""
     import numpy as np
 
     return {
@@ -172,9 +180,8 @@ def _scores(total: Agreement) -> str:
     return f"drift {sum(total.drifts) / len(total.drifts):+.4f} on average, {max(map(abs, total.drifts)):.4f} at most"
 
 
-def _points(found: Verified) -> str:
-    total = found.agreement
-    whose = "of the LiDAR" if found.has_lidar else "scattered over the pictures"
+def _points(total: Agreement, *, has_lidar: bool) -> str:
+    whose = "of the LiDAR" if has_lidar else "scattered over the pictures"
     changed = sum(total.moved.values())
     moves = ", ".join(f"{a} to {b} {n}" for (a, b), n in total.moved.most_common(_MOST_MOVES))
     return f"{changed} of {total.points} {whose} change their role" + (f": {moves}" if moves else "")
