@@ -116,3 +116,20 @@ def test_missing_libraries_are_named(monkeypatch):
     with pytest.raises(ModelError, match="torch and onnx") as caught:
         model_train.check_libraries()
     assert "wallkit[train]" in caught.value.hint
+
+
+def test_the_command_says_what_it_would_do_and_what_is_missing(tmp_path, monkeypatch, capsys):
+    from wallkit.cli.app import main
+
+    rooms = flat_set(tmp_path / "rooms", train=3, val=2)
+    words = ["model", "train", str(rooms), "-o", str(tmp_path / "net")]
+    monkeypatch.setattr(model_train, "check_libraries", lambda: None)
+    with pytest.raises(SystemExit) as done:
+        main([*words, "--dry-run"])
+    assert done.value.code == 0
+    assert "trained on 3 pictures, judged on 2 others" in capsys.readouterr().out
+    assert not (tmp_path / "net").exists()
+    with pytest.raises(SystemExit) as done:
+        main([*words, "--yolo", "yolov8n-seg.yaml"])
+    assert done.value.code == 2
+    assert "which interpreter has Ultralytics?" in capsys.readouterr().err

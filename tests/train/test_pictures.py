@@ -31,11 +31,11 @@ def test_a_picture_of_the_right_size_stays_as_it_is():
 
 def test_rare_classes_weigh_more_and_unseen_ones_nothing():
     counts = np.array([[900.0, 90.0, 10.0, 0.0]])
-    weights = class_weights(counts, most=1e9)
+    weights = class_weights(counts, power=0.5, most=1e9)
     assert weights[3] == 0
     # one over the root of the share
     assert weights[2] / weights[1] == pytest.approx(3.0)
-    assert class_weights(counts, most=2.0).max() == 2.0
+    assert class_weights(counts, power=0.5, most=2.0).max() == 2.0
 
 
 def test_pictures_with_rare_classes_are_shown_more_often():

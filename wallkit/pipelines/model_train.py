@@ -34,7 +34,7 @@ class TrainRequest:
     """
 
     datasets: tuple[Path, ...]
-    size: tuple[int, int] = (320, 240)
+    size: tuple[int, int] = (256, 192)
     epochs: int | None = None
     batch: int | None = None
     rate: float | None = None
@@ -80,7 +80,10 @@ def train_model(
     from wallkit.train.network import parameters_of
 
     names = sets[0].names
-    train, val = (_pictures(sets, split, request.size) for split in ("train", "val"))
+    width, height = request.size
+    # a quarter larger than the network sees them, so that closer looks are sharp
+    train = _pictures(sets, "train", (width + width // 4, height + height // 4))
+    val = _pictures(sets, "val", request.size)
     fresh: list[int] = []
 
     def hear(epoch: Epoch) -> None:
@@ -119,7 +122,7 @@ def check_request(request: TrainRequest, out: Path, *, overwrite: bool) -> tuple
     for side in request.size:
         if side % _MULTIPLE or not 64 <= side <= 1280:
             width, height = request.size
-            hint = f"--size 320x240; sides are multiples of {_MULTIPLE} from 64 to 1280"
+            hint = f"--size 256x192; sides are multiples of {_MULTIPLE} from 64 to 1280"
             raise ModelError(f"a network for pictures of {width} x {height}", hint=hint)
     sets = tuple(read_training_set(folder) for folder in request.datasets)
     for one in sets:

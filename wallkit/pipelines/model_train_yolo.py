@@ -64,7 +64,8 @@ def train_yolo_model(
         shutil.copy(checkpoint, folder / "model.pt")
         epochs = epochs_of(results)
         (folder / "curves.csv").write_text(csv_of(epochs), encoding="utf-8")
-        draw_curves(epochs, folder / "curves.png", title=f"{request.start} on {found.folder.name}")
+        words = {"measure": "average precision of masks", "mean_label": "mAP50-95"}
+        draw_curves(epochs, folder / "curves.png", title=f"{request.start} on {found.folder.name}", **words)
         (folder / "data.yaml").unlink()
         shutil.rmtree(folder / "train")
         record = {

@@ -54,8 +54,8 @@ def inspect_model(path: Path, settings: SegmentSettings | None = None) -> Inspec
         ModelError: it cannot be loaded, or is no segmentation model.
     """
     segmenter = load_segmenter(path, settings)
-    graph = read_graph(path)
-    data = path.read_bytes()
+    graph = read_graph(segmenter.model.path)
+    data = segmenter.model.path.read_bytes()
     outputs = tuple((tensor, _meaning(tensor, segmenter)) for tensor in segmenter.model.outputs)
     notes = tuple(_notes(segmenter, graph))
     return Inspection(segmenter, graph, hashlib.sha256(data).hexdigest(), len(data), outputs, notes)

@@ -28,7 +28,7 @@ class Changes:
     blurred: float = 0.3
     noisy: float = 0.4
     squeezed: float = 0.3
-    cluttered: float = 0.25
+    cluttered: float = 0.12
 
 
 def changed(

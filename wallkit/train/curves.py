@@ -50,26 +50,39 @@ def csv_of(epochs: Sequence[Epoch]) -> str:
     return text.getvalue()
 
 
-def draw_curves(epochs: Sequence[Epoch], path: Path, *, title: str) -> None:
-    """Losses on the left, intersection over union on the right, as a PNG."""
-    from matplotlib.figure import Figure
+def draw_curves(
+    epochs: Sequence[Epoch],
+    path: Path,
+    *,
+    title: str,
+    measure: str = "intersection over union",
+    mean_label: str = "mean of all classes",
+) -> None:
+    """Losses on the left, how well classes are found on the right, as a PNG.
 
-    figure = Figure(figsize=(10, 4.2), dpi=120, layout="constrained")
+    Args:
+        measure: what `ious` and `mean_iou` are, in words.
+    """
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
+
+    figure = Figure(figsize=(11.5, 4.2), dpi=120, layout="constrained")
     losses, overlaps = figure.subplots(1, 2)
     numbers = [epoch.number for epoch in epochs]
     losses.plot(numbers, [epoch.train_loss for epoch in epochs], color=_FAINT, label="training, changed pictures")
     losses.plot(numbers, [epoch.val_loss for epoch in epochs], color=_INK, label="validation")
     losses.set(xlabel="epoch", ylabel="loss", ylim=(0, None))
     losses.legend(frameon=False)
-    for name in (name for name in _SHOWN if name in epochs[-1].ious):
+    ious = epochs[-1].ious
+    for name in [name for name in _SHOWN if name in ious] or list(ious):
         curve = [epoch.ious.get(name, float("nan")) for epoch in epochs]
-        (line,) = overlaps.plot(numbers, curve, lw=1.4, label=f"{name}  {curve[-1]:.2f}")
-        del line
+        overlaps.plot(numbers, curve, lw=1.4, label=f"{name}  {curve[-1]:.2f}")
     mean = [epoch.mean_iou for epoch in epochs]
-    overlaps.plot(numbers, mean, color=_INK, lw=2, ls="--", label=f"mean of all classes  {mean[-1]:.2f}")
-    overlaps.set(xlabel="epoch", ylabel="intersection over union, validation scenes", ylim=(0, 1))
-    overlaps.legend(frameon=False, fontsize=8, loc="lower right")
+    overlaps.plot(numbers, mean, color=_INK, lw=2, ls="--", label=f"{mean_label}  {mean[-1]:.2f}")
+    overlaps.set(xlabel="epoch", ylabel=f"{measure}, validation scenes", ylim=(0, 1))
+    overlaps.legend(frameon=False, fontsize=9, loc="center left", bbox_to_anchor=(1.01, 0.5))
     for axes in (losses, overlaps):
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.grid(alpha=0.25)
         axes.spines[["top", "right"]].set_visible(False)
     figure.suptitle(title, fontsize=11)

@@ -39,12 +39,12 @@ class Lesson:
     """
 
     epochs: int = 30
-    size: tuple[int, int] = (320, 240)
+    size: tuple[int, int] = (256, 192)
     batch: int = 8
     rate: float = 3e-3
     decay: float = 0.03
     averaged: float = 0.998
-    growth: tuple[tuple[float, float], ...] = ((0.6, 0.6), (0.9, 0.8), (1.0, 1.0))
+    growth: tuple[tuple[float, float], ...] = ((0.55, 0.75), (1.0, 1.0))
     dice: float = 0.5
     threads: int = 1
     seed: int = 0

@@ -58,15 +58,15 @@ def pixel_counts(classes: UInt8Array, count: int) -> Float64Array:
     return np.stack([np.bincount(one.ravel(), minlength=256)[:count] for one in classes]).astype(np.float64)
 
 
-def class_weights(counts: Float64Array, *, most: float = 5.0) -> Float64Array:
-    """(C,) weights in the loss by pixels (N, C): one over the root of a class's share, within a factor; 0 if never seen.
+def class_weights(counts: Float64Array, *, power: float = 0.25, most: float = 5.0) -> Float64Array:
+    """(C,) weights in the loss by pixels (N, C): a class's share to the -power, at most so much; 0 if never seen.
 
-    The root keeps the large classes sharp where plain inverse shares would let the small ones flood them.
+    A small power keeps the large classes sharp: by inverse shares, or their roots, the small ones flood the walls.
     """
     shares = counts.sum(axis=0) / max(float(counts.sum()), 1.0)
-    roots = np.where(shares > 0, 1 / np.sqrt(np.maximum(shares, 1e-9)), 0.0)
-    mean = float((roots * shares).sum())
-    return np.where(shares > 0, np.clip(roots / max(mean, 1e-9), 0.5, most), 0.0)
+    weights = np.where(shares > 0, np.maximum(shares, 1e-9) ** -power, 0.0)
+    mean = float((weights * shares).sum())
+    return np.where(shares > 0, np.minimum(weights / max(mean, 1e-9), most), 0.0)
 
 
 def showing_odds(

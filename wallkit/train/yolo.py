@@ -137,7 +137,7 @@ def train_yolo(
 
 
 def epochs_of(results: str) -> tuple[Epoch, ...]:
-    """The epochs of Ultralytics' results.csv: its losses added up, and mask mAP50 and mAP50-95 in the place of overlaps.
+    """The epochs of Ultralytics' results.csv: its losses added up, mask mAP50-95 in the place of the mean overlap.
 
     Raises:
         ModelError: it is no such table.
@@ -152,6 +152,6 @@ def _epoch(row: Mapping[str, str]) -> Epoch:
     losses = {
         part: sum(float(v) for k, v in row.items() if k.startswith(part) and "loss" in k) for part in ("train", "val")
     }
-    maps = {f"mask {name}": float(row.get(f"metrics/{name}(M)", "nan")) for name in ("mAP50", "mAP50-95")}
+    fifty, mean = (float(row.get(f"metrics/{name}(M)", "nan")) for name in ("mAP50", "mAP50-95"))
     rate = float(row.get("lr/pg0", "nan"))
-    return Epoch(int(float(row["epoch"])), losses["train"], losses["val"], maps["mask mAP50-95"], rate, 0, maps)
+    return Epoch(int(float(row["epoch"])), losses["train"], losses["val"], mean, rate, 0, {"mask mAP50": fifty})
