@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tests.localize.worlds import FLAT, NOBODY, fields_of, scan_at
+from tests.plan import cast
 from wallkit.core.geometry import compose
 from wallkit.core.grid import distances_at, placed, spread_of
 from wallkit.core.raycast import HIT, LONG, SHORT, cast_rays, classify_rays
-from wallkit.simulate.plan import cast
 
 POSE = np.array([3.0, 1.7, 0.6])
 TOLERANCES = {"tolerance_m": 0.2, "tolerance_per_m": 0.02}

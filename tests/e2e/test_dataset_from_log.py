@@ -14,7 +14,6 @@ from tests.maps.random_maps import clean_map
 from tests.simulate.conftest import gl
 from wallkit.dataset.labels import classes_from_png
 from wallkit.evaluate.tum import read_tum
-from wallkit.sample import __file__ as sample
 
 __all__ = ["gl"]
 STORY = """
@@ -142,11 +141,12 @@ def test_a_drop_list_that_does_not_fit_is_refused(logs, tmp_path, wallkit, drops
 
 
 def test_a_log_without_images_is_refused(tmp_path, wallkit):
-    from pathlib import Path
-
-    done = wallkit("dataset", "from-log", Path(sample).parent / "log.mcap", "-o", tmp_path / "set")
+    (tmp_path / "m.wkmap.urdf").write_bytes(clean_map(np.random.default_rng(6), turned=False))
+    words = ["--set", "duration_s=1", "--set", "crowd.walkers=0", "--set", "lidar.scanner.beams=20"]
+    assert wallkit("simulate", "log", "m.wkmap.urdf", *words, "-o", "run").code == 0
+    done = wallkit("dataset", "from-log", "run/log.mcap", "-o", "set")
     assert (done.code, "holds no images" in done.err) == (2, True), done.err
-    assert not list(tmp_path.iterdir())
+    assert not (tmp_path / "set").exists()
 
 
 def test_a_classes_file_with_an_impossible_name_is_refused(tmp_path, wallkit):

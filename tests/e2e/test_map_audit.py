@@ -4,23 +4,12 @@ from __future__ import annotations
 
 import json
 
-import numpy as np
 import pytest
 
-from tests.maps.audit_worlds import FLOOR, ROUTE, Z_M, map_of, with_wall
-from wallkit.core.geometry import matrix_from_pose
-from wallkit.core.types import Odometry, StampedPose, Transform
-from wallkit.logs.writer import McapWriter
+from tests.maps.audit_worlds import FLOOR, ROUTE, with_wall
+from tests.recorded import record
 from wallkit.maps.draft.write import write_draft
-from wallkit.maps.geometry import slice_at
 from wallkit.maps.importers import ImportOptions, import_map
-from wallkit.simulate.drive import OdometryNoise, follow, odometry_from
-from wallkit.simulate.lidar import Lidar, sweep
-from wallkit.simulate.plan import Plan
-
-START_NS = 1_700_000_000_000_000_000
-ODOMETRY_HZ = 20.0
-NOBODY = np.zeros((0, 3))
 
 
 @pytest.fixture(scope="module")
@@ -29,25 +18,7 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("audit")
     (folder / "true.wkmap.urdf").write_bytes(write_draft(FLOOR))
     (folder / "off.wkmap.urdf").write_bytes(write_draft(with_wall("east", (10.04, 0), (10.04, 7))))
-    rng = np.random.default_rng(0)
-    plan = Plan(slice_at(map_of(), Z_M).segments)
-    poses = follow(ROUTE, ODOMETRY_HZ)
-    stamps_ns = START_NS + np.arange(len(poses), dtype=np.int64) * round(1e9 / ODOMETRY_HZ)
-    odometry = odometry_from(rng, poses, OdometryNoise())
-    lidar = Lidar(beams=180, rate_hz=4.0)
-    with McapWriter(folder / "log.mcap") as file:
-        mount = matrix_from_pose(np.array(lidar.mount))
-        file.write(
-            "/tf_static",
-            (Transform(START_NS, "base_link", lidar.frame_id, mount, is_static=True),),
-            START_NS,
-            is_latched=True,
-        )
-        for i, stamp_ns in enumerate(stamps_ns.tolist()):
-            file.write("/odom", Odometry(stamp_ns, odometry[i]), stamp_ns)
-            file.write("/ground_truth/pose", StampedPose(stamp_ns, "map", poses[i]), stamp_ns)
-            if i % 5 == 0 and i + 5 < len(stamps_ns):
-                file.write("/scan", sweep(rng, lidar, plan, stamps_ns, poses, stamp_ns, lambda _: NOBODY), stamp_ns)
+    record(folder / "true.wkmap.urdf", ROUTE, folder / "drive").rename(folder / "log.mcap")
     return folder
 
 

@@ -8,9 +8,8 @@ import cv2
 import numpy as np
 import pytest
 
-from wallkit.core.geometry import matrix_from_pose
-from wallkit.core.types import Odometry, StampedPose, Transform
-from wallkit.logs.writer import McapWriter
+from tests.plan import Plan, occupancy
+from tests.recorded import record
 from wallkit.maps.draft.draft import Draft, DraftFixture, DraftWall
 from wallkit.maps.draft.write import write_draft
 from wallkit.maps.geometry import slice_at
@@ -19,13 +18,7 @@ from wallkit.maps.read import load_map
 from wallkit.pipelines.config import load_config
 from wallkit.pipelines.evaluate import evaluate_steps
 from wallkit.pipelines.localize import Request, localize, prepare
-from wallkit.simulate.drive import OdometryNoise, follow, odometry_from
-from wallkit.simulate.lidar import Lidar, sweep
-from wallkit.simulate.plan import Plan, occupancy
 
-START_NS = 1_700_000_000_000_000_000
-ODOMETRY_HZ = 20.0
-NOBODY = np.zeros((0, 3))
 # an L of two rooms, turned and off every grid, with two cupboards and a column
 TURN, SHIFT = 0.21, np.array([3.137, -1.713])
 WALLS = [(0, 0, 8, 0), (8, 0, 8, 5), (8, 5, 5, 5), (5, 5, 5, 9), (5, 9, 0, 9), (0, 9, 0, 0), (0, 4, 2.5, 4)]
@@ -53,10 +46,9 @@ def world(tmp_path_factory):
     )
     path = folder / "known.wkmap.urdf"
     path.write_bytes(write_draft(Draft("known", walls, fixtures, scan_plane_m=0.3)))
-    plan = Plan(slice_at(load_map(path), 0.3).segments)
-    write_raster(folder, plan)
+    write_raster(folder, Plan(slice_at(load_map(path), 0.3).segments))
     for seed in range(3):
-        write_log(folder / f"log{seed}.mcap", plan, seed)
+        record(path, [moved(*point) for point in ROUTE], folder / f"drive{seed}", seed)
     return folder
 
 
@@ -70,30 +62,11 @@ def write_raster(folder, plan):
     )
 
 
-def write_log(path, plan, seed):
-    rng = np.random.default_rng(seed)
-    poses = follow([moved(*point) for point in ROUTE], ODOMETRY_HZ)
-    stamps_ns = START_NS + np.arange(len(poses), dtype=np.int64) * round(1e9 / ODOMETRY_HZ)
-    odometry = odometry_from(rng, poses, OdometryNoise())
-    lidar = Lidar(beams=180, rate_hz=4.0)
-    with McapWriter(path) as file:
-        mount = Transform(
-            START_NS, "base_link", lidar.frame_id, matrix_from_pose(np.array(lidar.mount)), is_static=True
-        )
-        file.write("/tf_static", (mount,), START_NS, is_latched=True)
-        for i, stamp_ns in enumerate(stamps_ns.tolist()):
-            file.write("/odom", Odometry(stamp_ns, odometry[i]), stamp_ns)
-            file.write("/ground_truth/pose", StampedPose(stamp_ns, "map", poses[i]), stamp_ns)
-            if i % 5 == 0 and i + 5 < len(stamps_ns):
-                scan = sweep(rng, lidar, plan, stamps_ns, poses, stamp_ns, lambda _: NOBODY)
-                file.write("/scan", scan, stamp_ns)
-
-
 def errors_m(world, chart, *words):
     """Root mean square position error over every log, from the true start."""
     config = load_config(None, words).config
     found = []
-    for log in sorted(world.glob("log*.mcap")):
+    for log in sorted(world.glob("drive*/log.mcap")):
         run = localize(prepare(Request((log,), world / chart, init="truth"), config))
         found.append(evaluate_steps(run.steps, run.prepared.truth, config.evaluate).metrics["ate_rmse_m"].value)
     return np.array(found)
@@ -109,18 +82,21 @@ def test_on_a_known_world_the_semantic_map_beats_its_raster(world):
 
 def test_from_nowhere_it_finds_itself_in_a_semantic_map(wallkit, tmp_path, world):
     done = wallkit(
-        "localize", world / "log0.mcap", "--map", world / "known.wkmap.urdf", "--init", "global", "-o", "run"
+        "localize", world / "drive0/log.mcap", "--map", world / "known.wkmap.urdf", "--init", "global", "-o", "run"
     )
     assert done.code == 0, done.err
     assert json.loads((tmp_path / "run" / "metrics.json").read_text())["health"] == "LOCALIZED"
     run = json.loads((tmp_path / "run" / "run.json").read_text())
-    assert {entry["path"] for entry in run["inputs"]} == {str(world / "log0.mcap"), str(world / "known.wkmap.urdf")}
+    assert {entry["path"] for entry in run["inputs"]} == {
+        str(world / "drive0/log.mcap"),
+        str(world / "known.wkmap.urdf"),
+    }
 
 
 def test_a_faulty_map_ends_the_command_before_anything_is_written(wallkit, tmp_path, world):
     broken = (world / "known.wkmap.urdf").read_text().replace('<parent link="map"/>', '<parent link="mop"/>', 1)
     (tmp_path / "broken.wkmap.urdf").write_text(broken)
-    done = wallkit("localize", world / "log0.mcap", "--map", "broken.wkmap.urdf", "-o", "run")
+    done = wallkit("localize", world / "drive0/log.mcap", "--map", "broken.wkmap.urdf", "-o", "run")
     assert (done.code, done.out) == (2, "")
     assert "mop" in done.err
     assert "wallkit map validate broken.wkmap.urdf" in done.err

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from tests.localize.worlds import FLAT, NOBODY, fields_of, scan_at
+from tests.movers import claimed, legs, tour, walk
+from tests.plan import Plan, plan_from_polylines
 from wallkit.core.geometry import compose, relative, wrap_angle
 from wallkit.core.types import Health, StampedPose
 from wallkit.localize.ekf import scan_matching_ekf
@@ -18,9 +20,6 @@ from wallkit.localize.recovery import RECOVERIES, NoRecovery
 from wallkit.localize.resample import RESAMPLERS
 from wallkit.localize.sensor import SENSORS
 from wallkit.localize.settings import LocalizeSettings
-from wallkit.simulate.drive import OdometryNoise, follow, odometry_from
-from wallkit.simulate.people import legs, walk
-from wallkit.simulate.plan import Plan, plan_from_polylines
 
 ROUND = [(1.5, 1.5), (7.5, 1.5), (7.5, 3.5), (3.8, 3.8), (3.5, 7.0), (1.2, 7.0), (1.2, 4.0)]
 
@@ -43,9 +42,9 @@ def drive(
     rng, noise = np.random.default_rng(seed), np.random.default_rng([seed, 1])
     belief = localizer.start(rng, start)
     estimates, infos = [], []
-    for k, (pose, claimed) in enumerate(zip(poses, odometry, strict=True)):
+    for k, (pose, claims) in enumerate(zip(poses, odometry, strict=True)):
         discs = discs_at(k) if discs_at else NOBODY
-        belief = localizer.predict(rng, belief, claimed)
+        belief = localizer.predict(rng, belief, claims)
         scan = scan_at(plan, pose, discs=discs, sigma_m=sigma_m, rng=noise)
         belief, info = localizer.update(rng, belief, scan)
         estimates.append(belief.estimate(k))
@@ -60,8 +59,8 @@ def errors(estimates, poses):
 
 @pytest.fixture(scope="module")
 def trip():
-    poses = follow(ROUND, 5.0)
-    return poses, odometry_from(np.random.default_rng(11), poses, OdometryNoise())
+    poses = tour(ROUND)
+    return poses, claimed(np.random.default_rng(11), poses)
 
 
 def at(pose):
@@ -99,8 +98,8 @@ def test_global_start_finds_the_only_place_and_says_so(trip):
 @pytest.mark.parametrize("seed", range(3))
 def test_in_a_symmetric_room_it_never_claims_to_know_however_long_it_drives(corners, places, seed):
     """Particles of the true place may all die by chance; the map does not forget that it was as good."""
-    poses = follow([(1.5, 2.0), *[(4.5, 2.0), (4.5, 4.0), (2.0, 4.0), (1.5, 2.0)] * 3], 5.0)
-    odometry = odometry_from(np.random.default_rng(3 + seed), poses, OdometryNoise())
+    poses = tour([(1.5, 2.0), *[(4.5, 2.0), (4.5, 4.0), (2.0, 4.0), (1.5, 2.0)] * 3])
+    odometry = claimed(np.random.default_rng(3 + seed), poses)
     room = plan_from_polylines(corners)
     estimates, _, localizer, belief = drive(LocalizeSettings(), room, poses, odometry, start="global", seed=seed)
     assert not any(e.health is Health.LOCALIZED for e in estimates)
@@ -110,11 +109,11 @@ def test_in_a_symmetric_room_it_never_claims_to_know_however_long_it_drives(corn
 def test_kidnapped_it_notices_at_once_and_recovers(trip):
     poses, odometry = trip
     k = len(poses) // 2
-    elsewhere = follow(ROUND[::-1], 5.0)
-    odometry_there = compose(odometry[k - 1], odometry_from(np.random.default_rng(5), elsewhere, OdometryNoise()))
+    elsewhere = tour(ROUND[::-1])
+    odometry_there = compose(odometry[k - 1], claimed(np.random.default_rng(5), elsewhere))
     both = np.concatenate([poses[:k], elsewhere])
-    claimed = np.concatenate([odometry[:k], odometry_there])
-    estimates, infos, _, _ = drive(LocalizeSettings(), FLAT, both, claimed, start=at(poses[0]))
+    claims = np.concatenate([odometry[:k], odometry_there])
+    estimates, infos, _, _ = drive(LocalizeSettings(), FLAT, both, claims, start=at(poses[0]))
     position, heading = errors(estimates, both)
     wrong = (position > 1.0) | (heading > np.deg2rad(30))
     assert wrong[k]
@@ -239,8 +238,8 @@ def test_truth_lies_in_the_95_percent_region_in_90_to_98_percent_of_the_updates(
     inside = []
     for seed in range(20):
         plan, mapped, (w, h), rng = a_room(seed)
-        poses = follow([(rng.uniform(2.3, w - 2.3), rng.uniform(2.3, h - 2.3)) for _ in range(5)], 5.0)
-        odometry = odometry_from(rng, poses, OdometryNoise())
+        poses = tour([(rng.uniform(2.3, w - 2.3), rng.uniform(2.3, h - 2.3)) for _ in range(5)])
+        odometry = claimed(rng, poses)
         times = np.arange(len(poses)) / 5.0
         ways = [[tuple(rng.uniform((0.5, 0.5), (w - 0.5, h - 0.5))) for _ in range(4)] for _ in range(4)]
         walkers = [walk(way, rng.uniform(0.4, 1.2), times, rng.uniform(0, 5)) for way in ways]

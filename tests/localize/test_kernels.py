@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.localize.worlds import FLAT, NOBODY, fields_of
+from tests.plan import cast
 from wallkit.core.geometry import compose
 from wallkit.core.grid import BORDER, bordered, cells_from_points, placed
 from wallkit.core.raycast import cast_rays
@@ -17,7 +18,6 @@ from wallkit.localize.kernels import (
     sum_of_field,
     sum_of_mixtures,
 )
-from wallkit.simulate.plan import cast
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ import pytest
 
 from tests.localize.worlds import FLAT, fields_of, scan_at
 from tests.maps.drawn import box, placed, robot, wall
+from tests.plan import plan_from_polylines
 from wallkit.core.geometry import compose, wrap_angle
 from wallkit.core.types import BeamLabels, Frame
 from wallkit.localize.class_conditional import ClassConditional
@@ -17,7 +18,6 @@ from wallkit.maps.grids.semantic_fields import fields_from_map
 from wallkit.maps.read import read_map
 from wallkit.maps.xml import parse
 from wallkit.points.labels import labelled_scan
-from wallkit.simulate.plan import plan_from_polylines
 
 # a square room of 4 m; a door of 0.9 m, flush with the middle of the north wall, makes the one difference
 SIDE, DOOR = 4.0, (1.55, 2.45)

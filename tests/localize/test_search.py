@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.localize.worlds import FLAT, fields_of, scan_at
+from tests.plan import plan_from_polylines
 from wallkit.core.geometry import compose, relative, wrap_angle
 from wallkit.localize.search import _bounds, _split, find_places, prepare_search
-from wallkit.simulate.plan import plan_from_polylines
 
 SQUARE = plan_from_polylines([(0, 0), (6, 0), (6, 6), (0, 6), (0, 0)])
 RECTANGLE = plan_from_polylines([(0, 0), (9, 0), (9, 5), (0, 5), (0, 0)])

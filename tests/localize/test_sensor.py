@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from tests.localize.worlds import FLAT, fields_of, scan_at
+from tests.plan import plan_from_polylines
 from wallkit.core.geometry import compose
 from wallkit.core.types import FieldSet
 from wallkit.localize.sensor import SENSORS, Beam, ClassConditional, LikelihoodField
-from wallkit.simulate.plan import plan_from_polylines
 
 TRUE = np.array([3.5, 2.0, 0.3])
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from tests.plan import Plan, cast, occupancy, plan_from_polylines
 from wallkit.core.geometry import compose
 from wallkit.core.types import FieldSet, Float64Array, LabelledScan, Points
 from wallkit.maps.grids.fields import fields_from_grid
-from wallkit.simulate.plan import Plan, cast, occupancy, plan_from_polylines
 
 NOBODY = np.zeros((0, 3))
 

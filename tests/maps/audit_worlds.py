@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from tests.movers import legs, tour, walk
+from tests.plan import Plan, cast
 from wallkit.core.geometry import compose
 from wallkit.maps.audit.nouns import Logged
 from wallkit.maps.draft.doors import DraftDoor
@@ -15,9 +17,6 @@ from wallkit.maps.geometry import slice_at
 from wallkit.maps.model import SemanticMap
 from wallkit.maps.read import read_map
 from wallkit.maps.xml import parse
-from wallkit.simulate.drive import follow
-from wallkit.simulate.people import legs, walk
-from wallkit.simulate.plan import Plan, cast
 
 Z_M = 0.3
 SIGMA_M = 0.01
@@ -81,7 +80,7 @@ def logged_in(
     """What a robot sees on its way through the rooms; pose_sd [m, rad] is put on the poses it is said to have been at."""
     rng = np.random.default_rng(seed)
     plan = Plan(slice_at(truth, Z_M, doors).segments)
-    poses = follow(route, VIEWS_HZ)
+    poses = tour(route, VIEWS_HZ)
     stamps = np.arange(len(poses)) / VIEWS_HZ
     bearings = np.linspace(-np.pi, np.pi, beams, endpoint=False)
     mount = np.array([0.15, 0.0, 0.0])

@@ -7,6 +7,7 @@ import pytest
 import shapely
 
 from tests.maps.drawn import HEAD, box, placed, ring, wall
+from tests.plan import Plan, cast, occupancy, plan_from_polylines
 from wallkit.core.grid import distances_at
 from wallkit.core.grid import placed as placed_in
 from wallkit.core.raycast import cast_rays
@@ -17,7 +18,6 @@ from wallkit.maps.read import read_map
 from wallkit.maps.surfaces import floor_at, surfaces_at
 from wallkit.maps.xml import parse
 from wallkit.pipelines.maps import load_map
-from wallkit.simulate.plan import Plan, cast, occupancy, plan_from_polylines
 
 PLANE = '<wk:map format="1.0" units="m rad" up="z" scan_plane="0.3">{}</wk:map>'
 # the inside of ring(0, 0, 4, 3) is 3.9 m x 2.9 m

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from tests.maps.random_maps import clean_map
+from tests.plan import Plan, cast
 from tests.simulate.drawn import door, room, standing
 from wallkit.errors import MapError, SimulationError
 from wallkit.maps.geometry import slice_at
 from wallkit.maps.read import load_map
 from wallkit.pipelines.simulate_world import world_from_map
-from wallkit.simulate.plan import Plan, cast
 from wallkit.simulate.scene import NOTHING, Scene
 from wallkit.simulate.world import Body, Solid, World, upright
 

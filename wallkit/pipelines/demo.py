@@ -41,7 +41,7 @@ def run_demo(out: Path, observe: Callable[[str], None] | None = None) -> Demo:
         if observe:
             observe(name)
         loaded = load_config(None, words)
-        request = Request((SAMPLE / "log.mcap",), SAMPLE / "map.yaml", init="global")
+        request = Request((SAMPLE / "log.mcap",), SAMPLE / "floor.wkmap.urdf", init="global")
         folder = out / name
         folder.mkdir(parents=True)
         _, record, evaluation = run_seed(prepare(request, loaded.config), loaded, folder)

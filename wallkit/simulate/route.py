@@ -52,7 +52,11 @@ def drive(
     Raises:
         SimulationError: fewer than two waypoints, one within an obstacle, no way between two, or (direct) a wall on the way.
     """
-    corners = _corners(rng, route, floor)
+    return driven(route, _corners(rng, route, floor), rate_hz, duration_s=duration_s)
+
+
+def driven(route: Route, corners: Float64Array, rate_hz: float, *, duration_s: float = 0.0) -> Float64Array:
+    """Poses (T, 3) of a robot that goes straight from corner to corner (W, 2), whatever stands there; else as `drive`."""
     longest = round(min(duration_s or _LONGEST_S, _LONGEST_S) / _STEP_S)
     stand = round(0.5 / _STEP_S)
     (x0, y0), (x1, y1) = corners[:2].tolist()

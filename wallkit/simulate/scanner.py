@@ -179,7 +179,8 @@ def _spots(
     # where the energy is divided the range lies anywhere between; half of the time one surface wins
     is_mixed &= rng.random(len(bearings)) < 0.5
     share = rng.random(len(bearings))
-    between = np.where(is_mixed, near + share * (np.where(is_mixed, far, near) - near), ranges)
+    between = ranges.copy()
+    between[is_mixed] = near[is_mixed] + share[is_mixed] * (far[is_mixed] - near[is_mixed])
     return between, np.where(is_mixed, NOTHING, solids), cosines
 
 

@@ -1,14 +1,29 @@
-"""Walkers on a plan -> the discs a LiDAR at shin height sees of them over time."""
+"""Who moves in a drawn world: people on their rounds, as the discs a LiDAR sees, and a robot whose odometry errs."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from wallkit.core.types import Float64Array
+from wallkit.simulate.odometry import WheelOdometry, odometry_of
+from wallkit.simulate.route import Route, driven
 
 LEG_RADIUS_M = 0.07
 LEG_APART_M = 0.11
 STRIDE_M = 0.6
+ROUTE = Route(speed_m_s=0.6)
+# noise at every step, and wheels of the size they are believed to have
+NOISE = WheelOdometry(0.02, 0.01, 0.01, 0.005, radius_error=0.0, difference_error=0.0, baseline_error=0.0)
+
+
+def tour(corners: list[tuple[float, float]], rate_hz: float = 5.0) -> Float64Array:
+    """Poses (T, 3) of a robot that drives from corner to corner, at a rate."""
+    return driven(ROUTE, np.array(corners, dtype=np.float64), rate_hz)
+
+
+def claimed(rng: np.random.Generator, poses: Float64Array, rate_hz: float = 5.0) -> Float64Array:
+    """What noisy odometry says (T, 3) of poses (T, 3) at a rate."""
+    return odometry_of(rng, NOISE, poses, rate_hz)
 
 
 def walk(

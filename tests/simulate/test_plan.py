@@ -1,19 +1,15 @@
-"""Simulated worlds against closed forms: ranges, grids, routes, odometry, people."""
+"""The worlds that tests draw, against closed forms: ranges, grids, walkers."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from wallkit.core.geometry import relative
-from wallkit.simulate.drive import SPEED_M_S, OdometryNoise, follow, odometry_from
-from wallkit.simulate.lidar import Lidar, sweep
-from wallkit.simulate.people import LEG_RADIUS_M, legs, walk
-from wallkit.simulate.plan import cast, occupancy, plan_from_polylines
+from tests.movers import LEG_RADIUS_M, legs, walk
+from tests.plan import cast, occupancy, plan_from_polylines
 
 ROOM = plan_from_polylines([(0, 0), (4, 0), (4, 3), (0, 3), (0, 0)])
 NOBODY = np.zeros((0, 3))
-SILENT = OdometryNoise(0, 0, 0, 0)
 
 
 def test_ranges_in_a_rectangle_are_the_closed_form():
@@ -44,23 +40,6 @@ def test_a_grid_holds_the_floor_as_free_and_its_walls_where_they_are():
     assert grid.cells[0, 0] == -1
 
 
-def test_a_route_passes_its_corners_at_walking_pace_without_jumps():
-    poses = follow([(0, 0), (3, 0), (3, 2)], 10.0)
-    steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
-    assert steps.max() <= SPEED_M_S / 10 * 1.05
-    for corner in ((0, 0), (3, 0), (3, 2)):
-        assert np.hypot(*(poses[:, :2] - corner).T).min() < 1e-9
-
-
-def test_odometry_without_noise_is_the_route_seen_from_its_start():
-    poses = follow([(1, 1), (3, 1), (3, 4)], 10.0)
-    np.testing.assert_allclose(
-        odometry_from(np.random.default_rng(0), poses, SILENT), relative(poses[0], poses), atol=1e-9
-    )
-    noisy = odometry_from(np.random.default_rng(0), poses, OdometryNoise())
-    assert np.hypot(*(noisy - relative(poses[0], poses))[-1, :2]) > 0.01
-
-
 def test_a_walker_keeps_to_the_way_and_has_two_legs_apart():
     times = np.linspace(0, 60, 500)
     walker = walk([(0, 0), (4, 0), (4, 3)], 1.0, times)
@@ -69,17 +48,3 @@ def test_a_walker_keeps_to_the_way_and_has_two_legs_apart():
     assert discs.shape == (2, 3)
     assert np.all(discs[:, 2] == LEG_RADIUS_M)
     np.testing.assert_allclose(discs[:, :2].mean(axis=0), walker[0, :2], atol=1e-12)
-
-
-def test_a_sweep_of_a_standing_robot_has_the_noise_it_claims():
-    lidar = Lidar(sigma_m=0.02, sigma_per_m=0.0)
-    stamps, poses = np.array([0, 10**9]), np.array([[1.0, 1.0, 0.3]] * 2)
-    exact = cast(
-        ROOM, NOBODY, np.array([1.0, 1.0]) + 0.2 * np.array([np.cos(0.3), np.sin(0.3)]), 0.3 + lidar.bearings_rad, 12
-    )
-    off = [
-        sweep(np.random.default_rng(k), lidar, ROOM, stamps, poses, 0, lambda _: NOBODY).ranges_m - exact
-        for k in range(20)
-    ]
-    assert np.std(off) == pytest.approx(0.02, rel=0.05)
-    assert abs(np.mean(off)) < 0.001
