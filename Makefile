@@ -1,4 +1,4 @@
-.PHONY: demo test slow lint docs bench sample calibration
+.PHONY: demo test slow lint docs bench sample calibration evaluation-set
 demo:
 	wallkit demo --overwrite
 test:
@@ -12,7 +12,7 @@ docs:
 bench:
 	wallkit bench update --numpy
 sample:
-	python -m wallkit.pipelines.sample wallkit/sample
+	python -m wallkit.pipelines.sample
 # the sample robot's calibration, calib/front.toml and calib/laser-to-front.toml (needs OpenGL, some minutes; exit code 4 is CANNOT TELL)
 calibration:
 	rm -rf build/calibration && mkdir -p build/calibration && cp calib/boards/*.toml calib/robot.urdf build/calibration
@@ -29,3 +29,8 @@ calibration:
 	cd build/calibration && wallkit calib verify again/images --scans again/scans --board chessboard-plate-610x850.toml \
 		--calib laser-to-front.toml --lidar-sigma 10mm --urdf robot.urdf --write
 	cp build/calibration/front.toml build/calibration/laser-to-front.toml calib/
+# EVAL: which logs; JOBS: how many at once
+EVAL ?= *
+JOBS ?= 1
+evaluation-set:
+	wallkit simulate set evaluation --only '$(EVAL)' --jobs $(JOBS) -o evaluation-logs

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from wallkit.core.types import Float64Array, OccupancyGrid
+from wallkit.core.types import Float64Array, OccupancyGrid, Scan
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,15 @@ def cast(
     direction = np.stack([np.cos(bearings_rad), np.sin(bearings_rad)], axis=1)
     ranges = np.minimum(_to_segments(plan.walls, origin, direction), _to_discs(discs, origin, direction))
     return np.where(ranges <= reach_m, ranges, np.inf)
+
+
+def instant_scan(
+    rng: np.random.Generator, plan: Plan, pose: Float64Array, stamp_ns: int, *, beams: int = 270, sigma_m: float = 0.015
+) -> Scan:
+    """What a LiDAR at a pose (3,) measures among the walls at one moment, over 270 degrees and up to 12 m."""
+    bearings = np.linspace(-0.75 * np.pi, 0.75 * np.pi, beams)
+    ranges = cast(plan, np.zeros((0, 3)), pose[:2], pose[2] + bearings, 12.0) + sigma_m * rng.standard_normal(beams)
+    return Scan(stamp_ns, "laser", ranges.astype(np.float32), bearings.astype(np.float32), 0.0, 0.1, 12.0)
 
 
 def occupancy(plan: Plan, resolution_m: float, *, margin_m: float = 1.0, inside: Float64Array) -> OccupancyGrid:

@@ -38,11 +38,8 @@ from wallkit.pipelines.config import Config
 
 ROOT = Path(__file__).parents[1]
 SAMPLE = Path(wallkit.sample.__file__).parent
-PAGES = sorted(
-    path
-    for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("maps/*.md"), *ROOT.glob("calib/*.md"))
-    if path.is_file()
-)
+FOLDERS = ("docs/**", "maps", "calib", "evaluation", "")
+PAGES = sorted(path for folder in FOLDERS for path in ROOT.glob(f"{folder}/*.md".lstrip("/")) if path.is_file())
 SETTING = re.compile(r"`((?:logs|maps|segment|points|localize|evaluate|results)\.[a-z_0-9.]+)`|--set ([a-z_0-9.]+)=")
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 WALLKIT = f'exec "{sys.executable}" -c "from wallkit.cli.app import main; main()" "$@"'

@@ -9,6 +9,8 @@ import cv2
 import numpy as np
 
 from tests.localize.worlds import FLAT, INSIDE
+from tests.movers import tour
+from tests.plan import cast, occupancy
 from wallkit.calib.store import toml_from_calibration
 from wallkit.core.calibration import Calibration, Provenance
 from wallkit.core.camera import Camera
@@ -16,8 +18,6 @@ from wallkit.core.geometry import interpolate_poses
 from wallkit.core.types import CameraImage, CameraInfo, Odometry, Scan, StampedPose, Transform
 from wallkit.logs.writer import McapWriter
 from wallkit.segment.fixture import USUAL
-from wallkit.simulate.drive import follow
-from wallkit.simulate.plan import cast, occupancy
 
 START_NS = 1_700_000_000_000_000_000
 WAY = [(1.5, 1.5), (7.5, 1.5), (7.5, 3.5), (3.8, 3.8)]
@@ -78,7 +78,7 @@ def write_log(path: Path, *, seconds=12.0, oracle=True, images=True, info_size=(
               only_floor=False) -> Path:  # fmt: skip
     """10 Hz of scans, images 30 ms later, odometry at 50 Hz, the map and the truth in one log."""
     rng = np.random.default_rng(0)
-    poses = follow(WAY, 100.0)
+    poses = tour(WAY, 100.0)
     stamps = START_NS + (np.arange(len(poses)) * 10_000_000)
     end = min(stamps[-1] - 200_000_000, START_NS + round(seconds * 1e9))
     mount = np.eye(4)

@@ -7,19 +7,21 @@ from pathlib import Path
 import numpy as np
 
 from tests.localize.ceilings import CAMERA, UP, painted, photograph
+from tests.movers import NOISE, tour
+from tests.plan import instant_scan, occupancy, plan_from_polylines
 from wallkit.core.ceiling import CeilingMap
-from wallkit.core.geometry import interpolate_poses, matrix_from_pose
+from wallkit.core.geometry import compose, interpolate_poses, matrix_from_pose
 from wallkit.core.types import CameraImage, CameraInfo, Odometry, StampedPose, Trajectory, Transform
 from wallkit.evaluate.tum import write_tum
 from wallkit.logs.writer import McapWriter
 from wallkit.maps.ceiling.files import ceiling_files
-from wallkit.simulate.drive import OdometryNoise, follow, odometry_from
-from wallkit.simulate.lidar import Lidar, sweep
-from wallkit.simulate.plan import occupancy, plan_from_polylines
+from wallkit.simulate.odometry import WheelOdometry, odometry_of
 
 START_NS = 1_700_000_000_000_000_000
 ODOMETRY_HZ, IMAGE_EVERY, SCAN_EVERY = 20.0, 4, 3
 SIZE_M = (14.0, 2.4)
+# of the LiDAR on the robot
+MOUNT = np.array([0.2, 0.0, 0.0])
 # niches at the same places seen from either end
 WALLS = [(0, 0), (3, 0), (3, -0.5), (4, -0.5), (4, 0), (14, 0), (14, 2.4), (11, 2.4), (11, 2.9), (10, 2.9), (10, 2.4)]
 ROUTE = [(2.0, 1.1), (6.0, 1.5), (11.0, 0.9), (12.5, 1.3), (8.0, 1.4), (3.0, 1.0)]
@@ -37,7 +39,7 @@ def write_ceiling(folder: Path, ceiling: CeilingMap, name: str = "ceiling") -> P
 
 
 def write_log(
-    folder: Path, *, with_lidar: bool = True, noise: OdometryNoise | None = None, grey: bool = False, seed: int = 5
+    folder: Path, *, with_lidar: bool = True, noise: WheelOdometry = NOISE, grey: bool = False, seed: int = 5
 ) -> CeilingMap:
     """log.mcap, truth.tum, ceiling.yaml and map.yaml; the ceiling that was drawn."""
     import cv2
@@ -46,9 +48,9 @@ def write_log(
     ceiling = corridor_ceiling()
     write_ceiling(folder, ceiling)
     plan = plan_from_polylines([*WALLS, (0, 2.4), (0, 0)])
-    poses = follow(ROUTE, ODOMETRY_HZ)
+    poses = tour(ROUTE, ODOMETRY_HZ)
     stamps = START_NS + np.arange(len(poses), dtype=np.int64) * round(1e9 / ODOMETRY_HZ)
-    odometry = odometry_from(rng, poses, noise or OdometryNoise())
+    odometry = odometry_of(rng, noise, poses, ODOMETRY_HZ)
     write_tum(folder / "truth.tum", Trajectory(stamps, poses))
     _write_map(folder, occupancy(plan, 0.05, inside=np.array(ROUTE[0])))
     info = CameraInfo(
@@ -62,23 +64,17 @@ def write_log(
         np.eye(3),
         np.hstack([CAMERA.K, np.zeros((3, 1))]),
     )
-    lidar = Lidar()
-
-    def nobody(at_ns: int) -> np.ndarray:
-        return np.zeros((0, 3))
-
     with McapWriter(folder / "log.mcap") as file:
         mounts = [Transform(START_NS, "base_link", CAMERA.frame, UP, is_static=True)]
         if with_lidar:
-            T = matrix_from_pose(np.array(lidar.mount))
-            mounts.append(Transform(START_NS, "base_link", lidar.frame_id, T, is_static=True))
+            mounts.append(Transform(START_NS, "base_link", "laser", matrix_from_pose(MOUNT), is_static=True))
         file.write("/tf_static", tuple(mounts), START_NS, is_latched=True)
         file.write("/camera/up/camera_info", info, START_NS)
         for i, stamp in enumerate(stamps.tolist()):
             file.write("/odom", Odometry(stamp, odometry[i]), stamp)
             file.write("/ground_truth/pose", StampedPose(stamp, "map", poses[i]), stamp)
             if with_lidar and i % SCAN_EVERY == 0 and i + SCAN_EVERY < len(stamps):
-                file.write("/scan", sweep(rng, lidar, plan, stamps, poses, stamp, nobody), stamp)
+                file.write("/scan", instant_scan(rng, plan, compose(poses[i], MOUNT), stamp), stamp)
             if i % IMAGE_EVERY == 1:
                 # between two messages of the odometry
                 at = stamp + 17_000_000

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from tests.localize.worlds import FLAT, fields_of, scan_at
+from tests.plan import plan_from_polylines
 from wallkit.core.types import Estimate, Health
 from wallkit.points.kept import KeptSettings, kept_of
 from wallkit.points.line_fit import LineFit
-from wallkit.simulate.plan import plan_from_polylines
 
 POSE = np.array([3.0, 2.0, 0.5])
 ANYWHERE = Estimate(0, POSE, np.eye(3), Health.LOST)

@@ -10,6 +10,7 @@ import click
 from wallkit.cli import common
 from wallkit.cli.simulate_boards import boards
 from wallkit.cli.simulate_dataset import dataset
+from wallkit.cli.simulate_set import simulate_set_command
 
 if TYPE_CHECKING:
     from wallkit.pipelines.simulate_log import LogRequest, Simulated
@@ -131,9 +132,11 @@ def _lines(out: Path, done: Simulated) -> list[str]:
         f"log      {out / 'log.mcap'}: {done.duration_s:.1f} s, {done.path_m:.1f} m, {done.people} people",
         f"messages {messages}",
         f"lost     {lost or 'nothing'} (as the scenario's timing asks)",
-        f"truth    {out / 'truth.tum'}",
+        f"truth    {out / 'truth.tum'}, and sweep by sweep {out / 'truth.csv'}",
+        f"hardness {100 * done.unmapped_share:.1f} % of all returns come from what is not in the map",
         f"try      wallkit localize {out / 'log.mcap'} --map {out / 'map.wkmap.urdf'}",
     ]
 
 
 simulate.add_command(dataset)
+simulate.add_command(simulate_set_command)

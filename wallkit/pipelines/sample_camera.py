@@ -47,7 +47,7 @@ def write_calibration(out: Path, scenario: Scenario, scratch: Path) -> None:
     )
     gathered = gather((place,), None, BOARD, camera)
     run = run_extrinsics(gathered, options)
-    made = run.calibration(provenance(gathered))
+    made = run.calibration(provenance(gathered, "make sample"))
     if made is None:
         raise CalibrationError("the boards do not tell where the LiDAR is", where=place, hint="more poses")
     made = replace(made, lidar_frame=made.lidar_frame or robot.lidar_frame(scenario.lidar.frame))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import heapq
 import json
 import zlib
@@ -16,9 +17,10 @@ import numpy as np
 
 import wallkit
 from wallkit.core.config import table_from
-from wallkit.core.types import Trajectory, Transform
+from wallkit.core.types import CameraImage, Trajectory, Transform
 from wallkit.errors import SimulationError
 from wallkit.evaluate.tum import write_tum
+from wallkit.logs.encode import encode
 from wallkit.logs.writer import McapWriter
 from wallkit.maps.read import load_map
 from wallkit.pipelines.outputs import result_folder
@@ -26,7 +28,8 @@ from wallkit.pipelines.run_folder import sha256, write_json
 from wallkit.pipelines.simulate_ceiling import write_true_ceiling
 from wallkit.pipelines.simulate_jobs import Task, messages_of
 from wallkit.pipelines.simulate_play import START_NS, Message, Play, Sensor, Serialized
-from wallkit.pipelines.simulate_sensors import sensors_of
+from wallkit.pipelines.simulate_sensors import LidarSensor, sensors_of
+from wallkit.pipelines.simulate_truth import truth_csv, unmapped_share
 from wallkit.pipelines.simulate_world import world_from_map
 from wallkit.simulate.camera import Unit
 from wallkit.simulate.crowd import STEP_S, people_from
@@ -54,13 +57,15 @@ class LogRequest:
 
 @dataclass(frozen=True)
 class Simulated:
-    """What was written: messages by topic, and those that timing faults lost by sensor."""
+    """What was written: messages by topic, those that timing faults lost by sensor, and the share of all returns that come
+    from what is not in the map."""
 
     duration_s: float
     messages: dict[str, int]
     dropped: dict[str, int]
     path_m: float
     people: int
+    unmapped_share: float
 
 
 def prepare(request: LogRequest) -> Play:
@@ -72,7 +77,8 @@ def prepare(request: LogRequest) -> Play:
     scenario = request.scenario
     rngs = _generators(request.seed)
     robot = robot_from_urdf(request.robot_path)
-    world = staged(world_from_map(load_map(request.map_path)), scenario)
+    mapped = world_from_map(load_map(request.map_path))
+    world = staged(mapped, scenario)
     states_at = door_states(world, scenario)
     floor = floor_of(world, states_at(0.0))
     poses = drive(rngs["route"], scenario.route, floor, _TRUTH_HZ, duration_s=scenario.duration_s)
@@ -80,13 +86,16 @@ def prepare(request: LogRequest) -> Play:
     paces = poses[:: round(STEP_S * _TRUTH_HZ)]
     people = people_from(rngs["people"], scenario.crowd, floor_of(world, with_doors=False), paces)
     world = populated(world, people)
-    return Play(scenario, robot, world, Scene(world), people, states_at, stamps_ns, poses, rngs, request.seed)
+    stands = {solid.instance for solid in mapped.solids} - {moved.link for moved in scenario.moved}
+    return Play(
+        scenario, robot, world, Scene(world), people, states_at, stamps_ns, poses, rngs, request.seed, frozenset(stands)
+    )
 
 
 def simulate_log(
     request: LogRequest, out: Path, *, overwrite: bool = False, jobs: int = 1, progress: Progress = lambda _: None
 ) -> Simulated:
-    """A folder with log.mcap, truth.tum, manifest.json, the map the robot is given, and with cameras the ceiling.
+    """A folder with log.mcap, truth.tum, truth.csv, manifest.json, the map the robot is given, and with cameras the ceiling.
 
     Args:
         jobs: processes that make pictures.
@@ -102,15 +111,19 @@ def simulate_log(
         measured = messages_of(_tasks(sensors), sensors, partial(prepare, request), jobs)
         with McapWriter(folder / "log.mcap") as file:
             _write_static(file, play)
-            counts = _write(file, _recorded(measured, play, progress))
+            counts, hashes = _write(file, _recorded(measured, play, progress))
         write_tum(folder / "truth.tum", Trajectory(play.stamps_ns[::5], play.poses[::5]))
         (folder / "map.wkmap.urdf").write_bytes(request.map_path.read_bytes())
         if any(camera.pictures for camera in request.scenario.cameras):
             write_true_ceiling(folder, play)
         steps = np.hypot(*np.diff(play.poses[:, :2], axis=0).T)
         dropped = {name: sensor.schedule.dropped for name, sensor in sensors.items()}
-        done = Simulated(play.duration_s, counts, dropped, float(steps.sum()), len(play.people.agents))
-        write_json(folder / "manifest.json", _manifest(request, play, done))
+        lidar = sensors["lidar"]
+        assert isinstance(lidar, LidarSensor)
+        (folder / "truth.csv").write_text(truth_csv(play, lidar.seen), encoding="utf-8")
+        hard = unmapped_share(lidar.seen)
+        done = Simulated(play.duration_s, counts, dropped, float(steps.sum()), len(play.people.agents), hard)
+        write_json(folder / "manifest.json", _manifest(request, play, done, hashes))
         # the mark by which --overwrite knows a folder of ours
         write_json(folder / "run.json", {"schema": 1, "command": "simulate log", "seed": request.seed})
     return done
@@ -162,15 +175,18 @@ def _recorded(
         yield due_ns, message
 
 
-def _write(file: McapWriter, messages: Iterable[tuple[int, Message]]) -> dict[str, int]:
+def _write(file: McapWriter, messages: Iterable[tuple[int, Message]]) -> tuple[dict[str, int], dict[str, str]]:
+    """Messages by topic, and by topic the sha256 of their bytes; not of pictures, which OpenGL has a part in."""
     counts: dict[str, int] = {}
+    hashes: dict[str, Any] = {}
     for log_ns, message in messages:
-        if isinstance(message.value, Serialized):
-            file.write_cdr(message.topic, message.value.type_name, log_ns, message.value.data)
-        else:
-            file.write(message.topic, message.value, log_ns)
+        value = message.value
+        type_name, data = (value.type_name, value.data) if isinstance(value, Serialized) else encode(value)
+        file.write_cdr(message.topic, type_name, log_ns, data)
         counts[message.topic] = counts.get(message.topic, 0) + 1
-    return counts
+        if not isinstance(value, CameraImage):
+            hashes.setdefault(message.topic, hashlib.sha256()).update(data)
+    return counts, {topic: sha.hexdigest() for topic, sha in hashes.items()}
 
 
 def _write_static(file: McapWriter, play: Play) -> None:
@@ -186,8 +202,8 @@ def _write_static(file: McapWriter, play: Play) -> None:
     file.write("/oracle/names", json.dumps(names), START_NS, is_latched=True)
 
 
-def _manifest(request: LogRequest, play: Play, done: Simulated) -> dict[str, Any]:
-    """manifest.json: from what the log was made, so that anyone makes it again."""
+def recipe(request: LogRequest) -> dict[str, Any]:
+    """Everything that decides what is in a log, as manifest.json has it."""
     import mujoco
 
     return {
@@ -199,10 +215,19 @@ def _manifest(request: LogRequest, play: Play, done: Simulated) -> dict[str, Any
         "map": {"file": request.map_path.name, "sha256": sha256(request.map_path)},
         "robot": {"file": request.robot_path.name, "sha256": sha256(request.robot_path)},
         "scenario": table_from(request.scenario),
+    }
+
+
+def _manifest(request: LogRequest, play: Play, done: Simulated, hashes: dict[str, str]) -> dict[str, Any]:
+    """manifest.json: from what the log was made, so that anyone makes it again and sees that it is the same."""
+    return {
+        **recipe(request),
         "duration_s": done.duration_s,
         "path_m": done.path_m,
         "people": done.people,
+        "unmapped_share": round(done.unmapped_share, 4),
         "messages": done.messages,
+        "sha256": hashes,
         "dropped": done.dropped,
         "classes": list(play.world.class_names),
         "cameras": {name: _unit_truth(unit) for name, unit in play.units.items()},

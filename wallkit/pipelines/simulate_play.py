@@ -36,6 +36,7 @@ class Play:
         stamps_ns, poses: (T,), (T, 3) where the robot truly is, T_map_base, at 100 Hz from START_NS on.
         rngs: a generator for each sensor, so that one more of them changes nothing in the others.
         seed: of the log; pictures draw from it and their own moment, in any order.
+        mapped: what stands where the map says it does.
     """
 
     scenario: Scenario
@@ -48,6 +49,7 @@ class Play:
     poses: Float64Array
     rngs: dict[str, np.random.Generator]
     seed: int = 0
+    mapped: frozenset[str] = frozenset()
 
     @property
     def duration_s(self) -> float:

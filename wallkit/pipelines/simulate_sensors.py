@@ -13,6 +13,7 @@ from wallkit.core.types import Float64Array, Odometry, StampedPose, Transform
 from wallkit.logs.encode import cloud_message
 from wallkit.pipelines.simulate_camera import CameraSensor
 from wallkit.pipelines.simulate_play import START_NS, Message, Play, Sensor, Serialized
+from wallkit.pipelines.simulate_truth import Met, met
 from wallkit.simulate.odometry import odometry_of
 from wallkit.simulate.scanner import Sweep, sweep
 from wallkit.simulate.scenario import LidarSetup, OdometrySetup, Timing
@@ -91,11 +92,12 @@ class OdometrySensor:
 
 @dataclass(frozen=True, eq=False)
 class LidarSensor:
-    """A planar LiDAR: /scan, and on /oracle/scan_points where each return truly came from."""
+    """A planar LiDAR: /scan, and on /oracle/scan_points where each return truly came from; `seen` counts them."""
 
     play: Play
     setup: LidarSetup
     schedule: Schedule
+    seen: list[Met] = field(default_factory=list)
 
     @property
     def frame(self) -> str:
@@ -103,6 +105,7 @@ class LidarSensor:
 
     def measure(self, at_ns: int, stamp_ns: int) -> Iterator[Message]:
         done = self.sweep(at_ns, stamp_ns)
+        self.seen.append(met(self.play, done, at_ns))
         yield Message("/scan", done.scan)
         yield Message("/oracle/scan_points", _oracle(self.play.scene, done))
 
