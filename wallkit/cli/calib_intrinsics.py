@@ -173,6 +173,8 @@ def _lines(result: CameraResult) -> list[str]:
         lines.append(
             f"{name} puts pixels elsewhere by {difference.median:.2f} px (median), {difference.worst:.2f} (worst)"
         )
+    if result.published is not None:
+        lines.append(result.published.words)
     rows = [[g.verdict, g.name, f"{g.value:.4g} {g.unit}".rstrip(), g.wanted, g.reason] for g in result.gates]
     lines += ["", *common.table(["", "asked", "found", "wanted", ""], rows).splitlines()]
     return [*lines, "", f"verdict  {result.verdict}"]

@@ -22,6 +22,7 @@ from wallkit.core.calibration import Calibration, Provenance, Verdict
 from wallkit.core.camera import Camera
 from wallkit.core.types import Float64Array, Int64Array
 from wallkit.pipelines.calib_captures import CaptureRequest, capture_from, input_files
+from wallkit.pipelines.calib_intrinsics_info import Published, published_against
 from wallkit.pipelines.provenance import digests, versions
 
 AUTO = "auto"
@@ -36,6 +37,7 @@ class CameraResult:
         capture: what was used. found: the solution. tried: lens models compared; only its own when one was named.
         halves: None when there are too few views. sigma_1m, sigma_far: px at 1 m and at infinity.
         difference: to the second-best sound model; None without one. gates, verdict: see `camera_gates`.
+        published: the camera_info of the log against it; None where there is none.
     """
 
     calibration: Calibration
@@ -48,6 +50,7 @@ class CameraResult:
     sigma_far: PixelMap
     difference: tuple[str, PixelMap] | None
     gates: tuple[Gate, ...]
+    published: Published | None = None
 
     @property
     def verdict(self) -> Verdict:
@@ -105,6 +108,7 @@ def calibrate_camera(
         projection_sigma(found.camera, found.covariance),
         _difference(found, capture, tried),
         gates,
+        published_against(request, found.camera),
     )
 
 
@@ -167,6 +171,7 @@ def document(result: CameraResult) -> dict[str, Any]:
             "outer_far": result.sigma_far.outer,
             "worst_far": result.sigma_far.worst,
         },
+        "camera_info": None if result.published is None else _published(result.published),
         "pictures": result.capture.looked_at,
         "left_out": dict(result.capture.left_out),
         "rejected_views": dict(found.rejected_views),
@@ -175,6 +180,16 @@ def document(result: CameraResult) -> dict[str, Any]:
             {"name": v.name, "corners": len(v.ids), "rms_px": r, "sharpness": v.sharpness, "motion_px": v.motion_px}
             for v, r in zip(found.views, rms, strict=True)
         ],
+    }
+
+
+def _published(found: Published) -> dict[str, Any]:
+    off = found.difference
+    return {
+        "topic": found.topic,
+        "fault": found.fault or None,
+        "difference_median_px": None if off is None else off.median,
+        "difference_worst_px": None if off is None else off.worst,
     }
 
 
