@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from tests.e2e.board_log import BOARD, middle_first, picture, scan_of
+from tests.e2e.board_log import BOARD, middle_first, picture, pose_at, scan_of, stations
 from wallkit.calib.worlds import board_at
 from wallkit.cli.calib_extrinsics import extrinsics
 from wallkit.errors import WallkitError
@@ -97,6 +97,19 @@ def test_a_board_that_is_cut_off(sound, tmp_path, monkeypatch):
         grey[:, 330 - 20 * i :] = 110
         cv2.imwrite(str(tmp_path / f"{i}.png"), grey)
     assert "cut off" in message(sound, monkeypatch, str(tmp_path))
+
+
+def test_corners_that_opencv_makes_up_are_no_board():
+    """A board whose right third is hidden: the search of OpenCV puts the last columns on the bare wall."""
+    from wallkit.calib.detect import find_corners, find_quickly
+
+    rng = np.random.default_rng(0)
+    whole = picture(pose_at(stations(3), 0.0), rng)
+    cut = whole.copy()
+    cut[:, 330:] = 110
+    assert find_corners(whole, BOARD) is not None
+    assert find_corners(cut, BOARD) is None
+    assert find_quickly(cut, BOARD, is_thorough=True) is None
 
 
 def test_no_board_in_the_scans(sound, tmp_path, monkeypatch):

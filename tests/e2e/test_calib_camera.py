@@ -74,7 +74,9 @@ def test_a_log_gives_its_camera_and_accounts_for_every_frame(wallkit, film, tmp_
     for name, value in truth.items():
         assert said["camera"][name] == pytest.approx(value, abs=max(3 * said["interval_95"][name], 1.0))
     assert said["camera"]["frame"] == "cam_optical"
-    assert said["camera_info"] is None
+    # the film's lens is the truth
+    assert said["camera_info"]["topic"] == "/cam/camera_info"
+    assert said["camera_info"]["difference_median_px"] < 1.0
     assert said["camera"]["name"] == "cam"
     toml, ros = read_calibration(tmp_path / "out.toml"), read_calibration(tmp_path / "out.yaml")
     np.testing.assert_array_equal(toml.camera.parameters, ros.camera.parameters)

@@ -18,6 +18,8 @@ WINDOW_PER_SPACING = 0.3
 _SMALLEST, _LARGEST = 2, 11
 _STOP = (3, 50, 1e-3)
 _FEWEST_CORNERS = 6
+# grey values around a corner spread at least by this share of what is usual on the board; plain wall has 0.05
+_PATCH_PER_SPACING, _LEAST_SPREAD = 0.3, 0.15
 # a corner that was lost is looked for where so many others put it
 _NEIGHBOURS = 8
 _QUICK_WIDTH = 320
@@ -54,7 +56,10 @@ def find_corners(grey: UInt8Array, board: Board, *, half_window: int | None = No
         return None
     ids, pixels = found
     if board.kind == "chessboard":
-        pixels = _refined_together(grey, pixels, board, half_window or _half_window(_spacing(pixels)))
+        spacing = _spacing(pixels)
+        pixels = _refined_together(grey, pixels, board, half_window or _half_window(spacing))
+        if half_window is None and not _all_cross(grey, pixels, spacing):
+            return None
     elif half_window:
         pixels = _refined(grey, pixels, half_window)
     return Corners(ids, pixels, _spacing(pixels), sharpness(grey, pixels))
@@ -92,6 +97,8 @@ def find_quickly(grey: UInt8Array, board: Board, *, is_thorough: bool) -> Corner
     if rough is None:
         return None
     pixels = _refined_together(grey, rough, board, _half_window(_spacing(rough)))
+    if not _all_cross(grey, pixels, _spacing(rough)):
+        return None
     return Corners(np.arange(len(pixels)), pixels, _spacing(pixels), sharpness(grey, pixels))
 
 
@@ -105,6 +112,23 @@ def sharpness(grey: UInt8Array, pixels: Float64Array) -> float:
     box = grey[low[1] : high[1], low[0] : high[0]]
     spread = float(box.var()) if box.size else 0.0
     return float(cv2.Laplacian(box, cv2.CV_64F).var()) / spread if spread > 0 else 0.0
+
+
+def _all_cross(grey: UInt8Array, pixels: Float64Array, spacing_px: float) -> bool:
+    """Whether there is something at every corner: of a board that is cut off, OpenCV makes the missing ones up."""
+    reach = max(2, round(_PATCH_PER_SPACING * spacing_px))
+    height, width = grey.shape
+    columns, rows = (np.round(pixels[:, i]).astype(int) for i in (0, 1))
+    spreads = np.array(
+        [
+            np.ptp(grey[max(0, v - reach) : min(height, v + reach + 1), max(0, u - reach) : min(width, u + reach + 1)])
+            if -reach <= u < width + reach and -reach <= v < height + reach
+            else 0.0
+            for u, v in zip(columns, rows, strict=True)
+        ],
+        dtype=np.float64,
+    )
+    return bool((spreads > _LEAST_SPREAD * np.median(spreads)).all())
 
 
 def _half_window(spacing_px: float) -> int:
