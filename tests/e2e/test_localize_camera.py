@@ -171,6 +171,14 @@ def test_a_camera_info_of_another_size_is_refused(world, tmp_path):
     assert "camera_info says 640 x 480" in allowed.sight.cameras[0].notes[0]
 
 
+def test_a_calibration_that_nobody_verified_is_used_and_named(world, tmp_path):
+    path = camera_log.write_calibration(tmp_path / "new.toml", camera_log.calibration(verdict="", pixel_error_95=None))
+    unverified, unknown = prepared(world / "log.mcap", calibrations=(path,), **ORACLE).sight.cameras[0].notes
+    assert "never verified" in unverified
+    assert "has no pixel_error_95" in unknown
+    assert not ready(world).sight.cameras[0].notes
+
+
 def test_a_log_without_a_camera_is_refused_and_the_lidar_stands_in_when_told(world, tmp_path):
     log = camera_log.write_log(tmp_path / "log.mcap", seconds=0.5, images=False, oracle=False)
     model = str(world / "colours.onnx")

@@ -181,7 +181,7 @@ def _checked(log: Log, topic: str, calibration: Calibration, path: Path, *, allo
         raise LogError(f"the topic {topic} holds no readable image", where=log.name, hint="choose another --camera")
     image = first[0].value
     height, width = (ids_from_png(image) if topic.startswith(ORACLE) else pixels_from_image(image)).shape[:2]
-    camera, notes = calibration.camera, []
+    camera, notes = calibration.camera, _doubts(calibration, path)
     if (width, height) != (camera.width, camera.height):
         message = f"is for images of {camera.width} x {camera.height}, those of {topic} have {width} x {height}"
         hint = "the images were resized or cropped after calibrating: calibrate the mode that was recorded"
@@ -189,8 +189,19 @@ def _checked(log: Log, topic: str, calibration: Calibration, path: Path, *, allo
     pictures = [t for t in _pictures_beside(log, topic) if _name_of(t) == _name_of(topic)]
     info = _info_of(log, pictures[0] if pictures else topic, image.frame_id)
     if info is not None:
-        notes = _compared(info, calibration, (width, height), topic, path, allow_unverified=allow_unverified)
+        notes += _compared(info, calibration, (width, height), topic, path, allow_unverified=allow_unverified)
     return Camera(_name_of(topic), topic, pictures[0] if pictures else "", calibration, path, tuple(notes))
+
+
+def _doubts(calibration: Calibration, path: Path) -> list[str]:
+    """What a calibration does not say of itself."""
+    found = []
+    if calibration.verdict != "PASS":
+        said = calibration.verdict or "never verified"
+        found.append(f"{path}: {said}: check it with `wallkit calib verify`")
+    if calibration.pixel_error_95 is None:
+        found.append(f"{path}: has no pixel_error_95, so points.look.unknown_error_px stands in for it")
+    return found
 
 
 def _pictures_beside(log: Log, topic: str) -> tuple[str, ...]:
