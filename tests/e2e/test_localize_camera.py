@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from tests.e2e import camera_log
+from wallkit.cli.localize import warnings_of
 from wallkit.core.camera import Camera
 from wallkit.errors import CalibrationError, ConfigError, LogError, ModelError
 from wallkit.logs.reader import open_log
@@ -202,6 +203,13 @@ def test_what_is_missing_is_asked_for(world):
         ready(world, cameras=("rear",))
     with pytest.raises(ConfigError, match="2 cameras and 1 calibrations"):
         ready(world, cameras=("front", "rear"))
+
+
+def test_a_camera_that_nothing_looks_through_is_not_used(world):
+    assert ready(world, ("line_fit",)).sight is None
+    assert ready(world, ()).sight is None
+    assert ready(world, (), words=("localize.sensor=per_class",)).sight is not None
+    assert warnings_of(ready(world, ()))[-1].startswith("nothing looks through the camera")
 
 
 def test_a_camera_is_found_by_name_or_topic_or_frame(world, tmp_path):

@@ -87,7 +87,7 @@ def compare(
 
     from wallkit.pipelines.report import COMPARED, COMPARED_IN_PAPERS, compare_runs, write_compare_report
     from wallkit.report.compare import compare_rows, difference_rows
-    from wallkit.report.paper import paper_headers, paper_rows
+    from wallkit.report.paper import paper_differences, paper_headers, paper_rows
 
     settings = _settings(flags["config_path"], flags["words"], None)
     names = _names(runs)
@@ -101,8 +101,8 @@ def compare(
     elif paper:
         headers = paper_headers()
         click.echo(common.table(headers, paper_rows(data), right=tuple(range(1, len(headers)))))
-        for key, what, how_sure in difference_rows(data):
-            click.echo(f"{key}: {what} [{how_sure}]")
+        for line in paper_differences(data):
+            click.echo(line)
     else:
         rows = [[row.key, *(f"{c.text}{' *' if c.is_best else ''}" for c in row.cells)] for row in compare_rows(data)]
         click.echo(common.table(["metric (* best)", *names], rows, right=tuple(range(1, len(names) + 1))))

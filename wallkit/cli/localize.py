@@ -182,7 +182,12 @@ def warnings_of(prepared: Prepared) -> list[str]:
     """What is odd about the map and the cameras."""
     found = [str(finding) for finding in prepared.map.findings if finding.severity != "info"]
     found += [note for camera in (prepared.sight.cameras if prepared.sight else ()) for note in camera.notes]
-    return found + ([f"the LiDAR alone is used: {prepared.fallen_back}"] if prepared.fallen_back else [])
+    cameras = prepared.request.cameras
+    if prepared.fallen_back:
+        found.append(f"the LiDAR alone is used: {prepared.fallen_back}")
+    elif prepared.sight is None and (cameras.model or cameras.calibrations):
+        found.append("nothing looks through the camera: --filter wall_mask, soft_mask or reject_dynamic would")
+    return found
 
 
 def wanted_from_flags(flags: dict[str, Any]) -> Wanted:

@@ -25,6 +25,7 @@ from wallkit.localize.ceiling_filter import CeilingLocalizer, ceiling_localizer
 from wallkit.localize.ekf import ScanMatchingEkf, scan_matching_ekf
 from wallkit.localize.filter import MonteCarloLocalizer, monte_carlo_localizer
 from wallkit.localize.initial import SPREADS
+from wallkit.localize.per_class import PerClass
 from wallkit.logs.loss import Loss
 from wallkit.logs.reader import Log, open_log
 from wallkit.logs.results import ResultWriter
@@ -73,8 +74,9 @@ class Request:
     camera: CameraWords = field(default_factory=CameraWords)
 
     def looks(self, config: Config) -> bool:
-        """Whether cameras are used."""
-        return config.points.needs_camera or bool(self.cameras.model or self.cameras.calibrations)
+        """Whether cameras are used: by a filter, or by the sensor model that asks for classes."""
+        by_sensor = isinstance(config.localize.sensor, PerClass)
+        return config.points.needs_camera or (by_sensor and bool(self.cameras.model or self.cameras.calibrations))
 
 
 @dataclass(frozen=True)
