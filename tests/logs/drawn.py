@@ -42,7 +42,7 @@ def sweep(
     for k, angle in enumerate(angles):
         lidar = compose(pose_at(motion, stamp_ns + round(k * interval_s * SECOND_NS)), mount)
         direction = np.array([np.cos(lidar[2] + angle), np.sin(lidar[2] + angle)])
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore"):
             ranges[k] = np.min(np.where(direction > 0, ROOM_M - lidar[:2], ROOM_M + lidar[:2]) / np.abs(direction))
     limits = 0.05, 20.0
     return Scan(stamp_ns, "laser", ranges.astype(np.float32), angles.astype(np.float32), interval_s, *limits)
