@@ -197,8 +197,7 @@ def test_a_log_without_a_camera_is_refused_and_the_lidar_stands_in_when_told(wor
 def test_what_is_missing_is_asked_for(world):
     with pytest.raises(ConfigError, match="needs to know where LiDAR points land"):
         prepared(world / "log.mcap", **ORACLE)
-    with pytest.raises(ConfigError, match="needs a model that says what images show"):
-        prepared(world / "log.mcap", calibrations=(world / "front.toml",))
+    assert prepared(world / "log.mcap", calibrations=(world / "front.toml",)).sight.model == "default"
     with pytest.raises(LogError, match="no camera 'rear'"):
         ready(world, cameras=("rear",))
     with pytest.raises(ConfigError, match="2 cameras and 1 calibrations"):

@@ -38,7 +38,7 @@ camera_options = common.options(
         metavar="NAME",
         help="wall_mask, soft_mask, reject_dynamic (cameras); line_fit, novelty (LiDAR alone); several multiply.",
     ),
-    click.option("--model", metavar="FILE.onnx|oracle", help="What segments images; oracle: a simulated log's masks."),
+    click.option("--model", metavar="FILE.onnx|oracle", help="What segments images; else wallkit's own model."),
     click.option(
         "--calib", "calibrations", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
         help="Camera and LiDAR; once for each camera.",

@@ -31,7 +31,8 @@ class CameraRequest:
 
     Attributes:
         calibrations: a file for each camera. cameras: their topics or names, in the same order; none: found by the files.
-        model: an ONNX file, "oracle" for what a simulator recorded, "" for the settings' own.
+        model: an ONNX file, "oracle" for what a simulator recorded, "default" for the one inside the package; "" for the
+            settings' own, else the default.
         allow_unverified: use a calibration whose verdict is FAIL.
         may_fall_back: go on with the LiDAR alone where the cameras cannot be used.
         overlays: pictures to draw.

@@ -12,15 +12,23 @@ import numpy as np
 from wallkit.core.geometry import invert_matrix
 from wallkit.core.segmentation import Segmentation, Segmenter
 from wallkit.core.types import BeamLabels, CameraImage, Float64Array, Frame, Int64Array, UInt8Array, View
-from wallkit.errors import ConfigError, LogError, ModelError
+from wallkit.errors import LogError, ModelError
 from wallkit.logs.images import pixels_from_image
 from wallkit.logs.reader import Log
 from wallkit.logs.rig import Rig
-from wallkit.pipelines.cameras import ORACLE_MODEL, Camera, CameraRequest, find_cameras, ids_from_png, oracle_names
+from wallkit.pipelines.cameras import (
+    ORACLE_MODEL,
+    Camera,
+    CameraRequest,
+    find_cameras,
+    ids_from_png,
+    oracle_names,
+)
 from wallkit.points.filters import PointsSettings
 from wallkit.points.look import ClassesAt, Look, LookSettings, look, project_frame
 from wallkit.points.outlines import classes_by_outlines
 from wallkit.segment.ahead import Seen, look_ahead
+from wallkit.segment.default import DEFAULT
 
 if TYPE_CHECKING:
     from wallkit.segment.settings import SegmentSettings
@@ -184,12 +192,8 @@ def sight_of(
 
     Raises:
         WallkitError: as `find_cameras`; ModelError: the model cannot be used, or knows nothing of what filters keep.
-        ConfigError: no model is named.
     """
-    model = request.model or segment.model
-    if not model:
-        hint = "--model FILE.onnx, or --model oracle for a simulated log with masks"
-        raise ConfigError("a camera filter needs a model that says what images show", where="--model", hint=hint)
+    model = request.model or segment.model or DEFAULT
     is_oracle = model == ORACLE_MODEL
     cameras = find_cameras(log, request, is_oracle=is_oracle, lidar_frame=rig.lidar_frame)
     looks, names, roles = _oracle(log, segment) if is_oracle else _network(model, segment)
