@@ -115,7 +115,10 @@ def test_random_buildings_are_valid_maps(seed):
 
 
 def test_an_interrupted_run_goes_on_where_it_stopped(made, tmp_path, wallkit, monkeypatch):
-    """Its second scene was never made: the first one is taken as it is, and the whole is what it would have been."""
+    """Its second scene was never made: the first one is taken as it is, and the whole is what it would have been.
+
+    What it was to replace stays until the end.
+    """
     from wallkit.pipelines import simulate_dataset as pipeline
 
     out, _ = made
@@ -127,13 +130,18 @@ def test_an_interrupted_run_goes_on_where_it_stopped(made, tmp_path, wallkit, mo
             raise KeyboardInterrupt
         return real(request, folder, number)
 
+    (tmp_path / "set").mkdir()
+    for name in ("run.json", "old.txt"):
+        (tmp_path / "set" / name).write_text("{}")
     monkeypatch.setattr(pipeline, "make_scene", stopped)
     with pytest.raises(KeyboardInterrupt):
-        pipeline.simulate_dataset(request, tmp_path / "set")
-    assert not (tmp_path / "set").exists()
-    done = wallkit("simulate", "dataset", *WORDS, "-o", tmp_path / "set", "--json")
+        pipeline.simulate_dataset(request, tmp_path / "set", overwrite=True)
+    assert sorted(path.name for path in (tmp_path / "set").iterdir()) == ["old.txt", "run.json"]
+    done = wallkit("simulate", "dataset", *WORDS, "-o", tmp_path / "set", "--overwrite", "--json")
     assert done.code == 0, done.err
     assert done.json["resumed"] == 1
+    files = {path.relative_to(out) for path in out.rglob("*")}
+    assert files == {path.relative_to(tmp_path / "set") for path in (tmp_path / "set").rglob("*")}
     for path in out.rglob("masks/*/*.png"):
         assert (tmp_path / "set" / path.relative_to(out)).read_bytes() == path.read_bytes()
     assert [path.name for path in tmp_path.iterdir()] == ["set"]

@@ -13,7 +13,7 @@ import wallkit
 from wallkit.dataset.read import TrainingSet, read_pair, read_training_set
 from wallkit.errors import DatasetError, ModelError
 from wallkit.pipelines.model_evaluate import Judged, evaluate_model
-from wallkit.pipelines.outputs import check_out
+from wallkit.pipelines.outputs import check_out, put_in_place
 from wallkit.pipelines.run_folder import write_json
 from wallkit.train.curves import Epoch, csv_of, draw_curves
 from wallkit.train.pictures import Pictures, stacked
@@ -104,9 +104,7 @@ def train_model(
     write_json(working / "run.json", {"schema": 1, "command": "model train", **fingerprint, "export": export})
     checkpoint.unlink()
     (working / "request.json").unlink()
-    if out.is_dir():
-        shutil.rmtree(out)
-    working.rename(out)
+    put_in_place(working, out)
     resumed = lesson.epochs - len(fresh)
     return Trained(out / "model.onnx", learnt.epochs, judged, exported.size_bytes, parameters, resumed)
 

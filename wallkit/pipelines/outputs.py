@@ -46,13 +46,30 @@ def result_folder(out: Path, *, overwrite: bool) -> Iterator[Path]:
     except BaseException:
         shutil.rmtree(working, ignore_errors=True)
         raise
-    if out.is_dir():
-        old = out.absolute().with_name(f".{out.name}.replaced-{os.getpid()}")
-        out.rename(old)
+    put_in_place(working, out)
+
+
+def put_in_place(working: Path, out: Path) -> None:
+    """Gives a finished folder the name `out`; what was there goes only once it does, and is put back if it cannot.
+
+    Raises:
+        OutputError: it cannot be moved there; both folders are as they were.
+    """
+    old = out.absolute().with_name(f".{out.name}.replaced-{os.getpid()}")
+    try:
+        if out.is_dir():
+            out.rename(old)
         working.rename(out)
+    except OSError as error:
+        if old.is_dir():
+            old.rename(out)
+        raise OutputError(
+            f"cannot be written: {error.strerror}", where=out, hint=f"the result is in {working}: move it yourself"
+        ) from error
+    if old.is_symlink():
+        old.unlink()
+    elif old.is_dir():
         shutil.rmtree(old)
-    else:
-        working.rename(out)
 
 
 def check_file_out(out: Path, *, overwrite: bool) -> None:

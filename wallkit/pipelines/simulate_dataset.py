@@ -25,7 +25,7 @@ from wallkit.maps.draft.write import write_draft
 from wallkit.maps.read import load_map, read_map
 from wallkit.maps.xml import parse
 from wallkit.pipelines.dataset_views import Variety, camera_of, looks_of, people_of, views_of
-from wallkit.pipelines.outputs import check_out
+from wallkit.pipelines.outputs import check_out, put_in_place
 from wallkit.pipelines.run_folder import sha256, write_json
 from wallkit.pipelines.simulate_buildings import random_building
 from wallkit.pipelines.simulate_world import world_from_map
@@ -110,13 +110,10 @@ def simulate_dataset(
     records = [r for n in range(request.scenes) for r in json.loads(_scene_file(working, n).read_text("utf-8"))]
     title = f"wallkit {wallkit.__version__}, {len(records)} pictures of {request.scenes} scenes, seed {request.seed}"
     statistics = write_documents(layout, records, title=title)
-    write_json(working / "manifest.json", _manifest(fingerprint, records, statistics))
-    write_json(working / "run.json", {"schema": 1, "command": "simulate dataset", "seed": request.seed})
-    shutil.rmtree(working / "scenes")
-    (working / "request.json").unlink()
-    if out.is_dir():
-        shutil.rmtree(out)
-    working.rename(out)
+    write_json(layout.folder / "manifest.json", _manifest(fingerprint, records, statistics))
+    write_json(layout.folder / "run.json", {"schema": 1, "command": "simulate dataset", "seed": request.seed})
+    put_in_place(layout.folder, out)
+    shutil.rmtree(working)
     return Made(len(records), request.scenes, len(there), statistics)
 
 
@@ -231,7 +228,8 @@ def _splits(request: DatasetRequest) -> dict[str, str]:
 
 
 def _layout(request: DatasetRequest, folder: Path) -> Layout:
-    return Layout(folder, Labelling(request.labels))
+    """The set itself, beside what is known of the unfinished run."""
+    return Layout(folder / "set", Labelling(request.labels))
 
 
 def _scene_file(folder: Path, number: int) -> Path:
@@ -239,7 +237,9 @@ def _scene_file(folder: Path, number: int) -> Path:
 
 
 def _is_of(working: Path, fingerprint: Record) -> bool:
-    """Whether an unfinished folder is of the same request, by the same versions."""
+    """Whether an unfinished folder is of the same request, by the same versions, and its set was not taken out yet."""
+    if not (working / "set").is_dir():
+        return False
     try:
         return bool(json.loads((working / "request.json").read_text("utf-8")) == fingerprint)
     except (OSError, ValueError):
