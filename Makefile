@@ -1,10 +1,12 @@
-.PHONY: demo test slow lint docs bench sample calibration evaluation-set
+.PHONY: demo test slow guides lint docs bench sample calibration evaluation-set
 demo:
 	wallkit demo --overwrite
 test:
 	pytest -q
 slow:
 	pytest -q -m slow
+guides:
+	pytest -q -m guide tests/test_docs.py
 lint:
 	ruff check . && ruff format --check . && mypy
 docs:

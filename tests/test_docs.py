@@ -284,6 +284,7 @@ def follow(page: Path, folder: Path) -> None:
             said = None
 
 
+@pytest.mark.guide
 @pytest.mark.parametrize("page", GUIDES, ids=name_of)
 def test_a_guide_can_be_followed(page, tmp_path):
     folder = tmp_path / "here"
