@@ -83,3 +83,13 @@ def test_the_nearest_pixel_of_the_input_is_taken():
     mask[40 + 10 : 40 + 20, 5:9] = True
     rows, columns = np.nonzero(image_mask(mask, frame))
     assert (rows.min(), rows.max(), columns.min(), columns.max()) == (10, 19, 5, 8)
+
+
+def test_things_without_a_pixel_are_none(tmp_path):
+    """A sum of 0 everywhere is no mask; Ultralytics leaves such things out, and so does the comparison."""
+    found = colour_oracle(tmp_path).segment(
+        picture((240, 320), {"wall": (20, 40, 300, 220), "person": (100, 60, 160, 240)})
+    )
+    assert len(answer_of(found).things) == 2
+    found.detections.coefficients[1] = 0
+    assert [one.name for one in answer_of(found).things] == [found.names[found.detections.labels[0]]]

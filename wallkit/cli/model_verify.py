@@ -93,7 +93,10 @@ def pictures_from_flags(places: tuple[Path, ...], flags: dict[str, Any]) -> list
 
 def page(found: Verified, pictures: int) -> list[str]:
     """What a person reads."""
-    lines = [f"looked   at {pictures} pictures", *agreement_page(found.agreement, has_lidar=found.has_lidar)]
+    lines = [
+        f"looked   at {pictures} {'picture' if pictures == 1 else 'pictures'}",
+        *agreement_page(found.agreement, has_lidar=found.has_lidar),
+    ]
     if found.rectangle is not None:
         said = f"{_things(found.rectangle)}, {_masks(found.rectangle)}"
         lines.append(f"predict  as Ultralytics runs the checkpoint by itself, with a rectangular letterbox: {said}")

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from wallkit.core.segmentation import BACKGROUND, Segmentation
 from wallkit.core.types import BoolArray, Float64Array
 from wallkit.segment.class_map import ClassMap
+from wallkit.segment.detections import Detections
 from wallkit.segment.instances import Instances
 from wallkit.segment.letterbox import Letterbox
 
@@ -160,6 +161,12 @@ def painted(things: Sequence[Thing], names: tuple[str, ...], roles: tuple[str, .
     return Answer(ClassMap(ids, names, roles), tuple(things))
 
 
+def with_masks(found: Instances) -> Instances:
+    """Without the things that have no pixel in the network's input; Ultralytics leaves them out too."""
+    d, kept = found.detections, found.masks(of_net=True).any(axis=(1, 2))
+    return replace(found, detections=Detections(d.boxes[kept], d.scores[kept], d.labels[kept], d.coefficients[kept]))
+
+
 def image_mask(mask: BoolArray, frame: Letterbox) -> BoolArray:
     """(H, W) a mask of the network's input as the image's pixels see it: each takes the nearest."""
     height, width = frame.image
@@ -175,6 +182,8 @@ def image_mask(mask: BoolArray, frame: Letterbox) -> BoolArray:
 
 
 def _things(found: Instances, *, masks_of_net: bool) -> Iterable[Thing]:
+    """Those of `with_masks`."""
+    found = with_masks(found)
     masks = found.masks(of_net=masks_of_net)
     d, boxes = found.detections, found.frame.boxes_in_image(found.detections.boxes)
     for k in range(len(d)):

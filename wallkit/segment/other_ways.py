@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wallkit.core.types import BoolArray
-from wallkit.segment.agreement import Answer, answer_of_net, image_mask, painted
+from wallkit.segment.agreement import Answer, answer_of_net, image_mask, painted, with_masks
 from wallkit.segment.instances import Instances
 from wallkit.segment.letterbox import Letterbox, Preparation
 from wallkit.segment.onnx_segmenter import OnnxSegmenter
@@ -45,6 +45,7 @@ def run_another_way(segmenter: OnnxSegmenter, way: str) -> OnnxSegmenter:
 
 def cropped_first(found: Instances) -> Answer:
     """What programs say that crop the prototypes' grid to the box before they enlarge it, as Ultralytics did until 2026."""
+    found = with_masks(found)
     plain = answer_of_net(found)
     masks = _masks_cropped_first(found)
     things = [replace(one, mask=image_mask(masks[k], found.frame)) for k, one in enumerate(plain.things)]
@@ -53,6 +54,7 @@ def cropped_first(found: Instances) -> Answer:
 
 def with_one_gain(found: Instances) -> Answer:
     """What programs say that undo the letterbox with one gain for both axes."""
+    found = with_masks(found)
     gain = min(outer / side for outer, side in zip(found.frame.net, found.frame.image, strict=True))
     plain = answer_of_net(found)
     edges = found.detections.boxes.reshape(-1, 2, 2).astype(np.float64) - found.frame.corner[::-1]
