@@ -28,7 +28,10 @@ LIBRARIES = (
     "click",
     "rich",
 )
-OPTIONAL = {"av": "compressed video in logs: pip install 'wallkit[video]'"}
+OPTIONAL = {
+    "av": "compressed video in logs: pip install 'wallkit[video]'",
+    "onnx": "quantised models and fixtures: pip install 'wallkit[model]'",
+}
 
 
 @click.command()
