@@ -1,12 +1,32 @@
-"""`wallkit model` as a user runs it."""
+"""`wallkit model` as a user runs it; most of it in this process, since starting Python costs more than the models here."""
 
 from __future__ import annotations
+
+import subprocess
+import sys
 
 import cv2
 import pytest
 
+from tests.e2e.conftest import Done
 from tests.segment.altered import altered_oracle
 from tests.segment.drawn import picture
+from wallkit.cli.app import main
+
+
+@pytest.fixture
+def wallkit(tmp_path, monkeypatch, capsys):
+    """Runs `wallkit WORDS...` in a folder of its own and in this process."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words: object) -> Done:
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            main([str(word) for word in words], prog_name="wallkit")
+        said = capsys.readouterr()
+        return Done(int(ended.value.code or 0), said.out, said.err)
+
+    return run
 
 
 @pytest.fixture
@@ -136,3 +156,10 @@ def test_export_prints_the_set_up_and_says_what_it_lacks(wallkit, tmp_path):
     done = wallkit("model", "export", "best.pt", "--python", python)
     assert (done.code, "has no Ultralytics" in done.err) == (2, True)
     assert not (tmp_path / "best.onnx").exists()
+
+
+def test_the_command_itself_runs(tmp_path):
+    command = [sys.executable, "-c", "from wallkit.cli.app import main; main()", "model", "fixture", "oracle.onnx"]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("wrote oracle.onnx, 4.8 kB: yolo-anchors, 320 x 320 px\n  wall ")
