@@ -67,6 +67,13 @@ class Camera:
         """How far from the axis the radial map grows: radius at unit depth, or angle [rad] of `equidistant`."""
         return self.lens.limit(self.D)
 
+    @cached_property
+    def compiled(self) -> tuple[Float64Array, Float64Array]:
+        """(6,) fx, fy, cx, cy, width, height and (8,) D with zeros behind, as compiled loops take them."""
+        D = np.zeros(8)
+        D[: len(self.D)] = self.D
+        return np.array([*self.K[[0, 1, 0, 1], [0, 1, 2, 2]], self.width, self.height]), D
+
     @property
     def parameters(self) -> Float64Array:
         """(4 + n,) fx, fy, cx, cy and D, in the order of `parameter_jacobian` and of covariances."""

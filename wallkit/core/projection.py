@@ -22,9 +22,7 @@ def project_points(
     points = np.ascontiguousarray(points_m)
     pixels, depths = np.empty((len(points), 2)), np.empty(len(points))
     inside = np.empty(len(points), dtype=np.bool_)
-    D = np.zeros(8)
-    D[: len(camera.D)] = camera.D
-    K = np.array([camera.K[0, 0], camera.K[1, 1], camera.K[0, 2], camera.K[1, 2], camera.width, camera.height])
+    K, D = camera.compiled
     kernel = _equidistant if camera.model == "equidistant" else _brown
     kernel(points, np.ascontiguousarray(T[:3], dtype=np.float64), K, D, camera.limit, pixels, depths, inside)
     return pixels, depths, inside

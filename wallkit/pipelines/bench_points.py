@@ -34,7 +34,7 @@ from wallkit.localize.settings import LocalizeSettings
 from wallkit.pipelines.bench import bench_scene
 from wallkit.points.filters import FILTERS, apply_filters
 from wallkit.points.labels import labelled_scan
-from wallkit.points.look import LookSettings, look, project_frame
+from wallkit.points.look import ClassesAt, LookSettings, look, project_frame
 from wallkit.points.outlines import classes_in
 
 ROUNDS = 200
@@ -82,15 +82,16 @@ def time_filter(beams: int, polygons: int, corners: int, particles: int) -> list
     things = [Polygon(i % 2, 0.9, (ring,)) for i, ring in enumerate(_blobs(rng, polygons, corners))]
     T_lidar_base, class_of = np.eye(4), np.array([0, 1, 2, -1])
     sharp, exact = LookSettings(lookup="crossing_number", margins=0), LookSettings(lookup="crossing_number")
-    classes_at = classes_in(things, _CLASSES, (_HEIGHT, _WIDTH), "crossing_number")
+    by_number = classes_in(things, _CLASSES, (_HEIGHT, _WIDTH), "crossing_number")
+    by_mask = classes_in(things, _CLASSES, (_HEIGHT, _WIDTH), "mask")
     located = {s: project_frame(calibration, frame, view, T_lidar_base, s) for s in (sharp, exact)}
-    looked = look(located[exact], classes_at, class_of, 3)
+    looked = look(located[exact], by_number, class_of, 3)
     labels = BeamLabels(frame.stamp_ns, looked.labels, _CLASSES, looked.confidences, looked.shares)
     scan = labelled_scan(replace(frame, labels=labels))
     estimate = Estimate(0, _POSE, np.eye(3) * 1e-4, Health.LOCALIZED)
     filters = {name: FILTERS[name]().on(fields) for name in FILTERS}
 
-    def filtered(settings: LookSettings) -> LabelledScan:
+    def filtered(settings: LookSettings, classes_at: ClassesAt = by_number) -> LabelledScan:
         seen = look(project_frame(calibration, frame, view, T_lidar_base, settings), classes_at, class_of, 3)
         shown = BeamLabels(frame.stamp_ns, seen.labels, _CLASSES, seen.confidences, seen.shares)
         return apply_filters([filters["wall_mask"]], labelled_scan(replace(frame, labels=shown)), estimate)
@@ -99,19 +100,22 @@ def time_filter(beams: int, polygons: int, corners: int, particles: int) -> list
     bare = labelled_scan(frame)
     work: dict[str, Callable[[], object]] = {
         "project": lambda: project_frame(calibration, frame, view, T_lidar_base, sharp),
-        "points in polygons": lambda: look(located[sharp], classes_at, class_of, 3),
-        "points in polygons, with margins": lambda: look(located[exact], classes_at, class_of, 3),
+        "points in polygons": lambda: look(located[sharp], by_number, class_of, 3),
+        "points in polygons, with margins": lambda: look(located[exact], by_number, class_of, 3),
         **{f"weights of {name}": lambda f=f: f.weigh(scan, estimate) for name, f in filters.items()},  # type: ignore[misc]
         "filter: project, polygons, weights": lambda: filtered(sharp),
         "filter, with margins": lambda: filtered(exact),
+        "filter, with margins, by mask": lambda: filtered(exact, by_mask),
         "update, basic": lambda: update(bare),
         "update, filtered": lambda: update(filtered(sharp)),
         "update, filtered with margins": lambda: update(filtered(exact)),
+        "update, filtered with margins, by mask": lambda: update(filtered(exact, by_mask)),
         "polygons packed, once per image": lambda: classes_in(things, _CLASSES, (_HEIGHT, _WIDTH), "crossing_number"),
+        "mask drawn, once per image": lambda: classes_in(things, _CLASSES, (_HEIGHT, _WIDTH), "mask"),
     }
     parts = {part.name: part for part in _timed(work, {})}
     basic = parts["update, basic"].median_ms
-    for name in ("update, filtered", "update, filtered with margins"):
+    for name in (name for name in parts if name.startswith("update, filtered")):
         parts[name] = replace(parts[name], note=f"{parts[name].median_ms / basic:.2f} x basic")
     return list(parts.values())
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike
 
-from wallkit.core.polygon import POINT_IN_POLYGON, packed
+from wallkit.core.polygon import POINT_IN_POLYGON, looked_up, mask_from, packed
 from wallkit.core.segmentation import BACKGROUND, Polygon, Segmentation
 from wallkit.core.types import Float32Array, Int64Array
 from wallkit.points.look import ClassesAt
@@ -31,14 +33,28 @@ def classes_in(polygons: Sequence[Polygon], names: Sequence[str], shape: tuple[i
     rest = names.index(BACKGROUND) if BACKGROUND in names else -1
     labels = np.array([*(polygon.label for polygon in ordered), rest], dtype=np.int64)
     sure = np.array([*(polygon.confidence for polygon in ordered), 0.0 if rest < 0 else 1.0], dtype=np.float32)
-    within = POINT_IN_POLYGON[method]
     height, width = shape
+    # a mask is drawn once for the image, not for every question
+    mask = mask_from(held, shape) if method == "mask" else None
 
     def classes_at(pixels: ArrayLike) -> tuple[Int64Array, Float32Array]:
-        at = np.asarray(pixels, dtype=np.float64)
-        found = within(at, held)
-        with np.errstate(invalid="ignore"):
-            inside = ((at >= -0.5) & (at < (width - 0.5, height - 0.5))).all(axis=1)
-        return np.where(inside, labels[found], -1), np.where(inside, sure[found], np.float32(0.0))
+        at = np.ascontiguousarray(pixels, dtype=np.float64)
+        found = POINT_IN_POLYGON[method](at, held) if mask is None else looked_up(at, mask)
+        confidences = np.empty(len(found), dtype=np.float32)
+        _name(at, labels, sure, width, height, found, confidences)
+        return found, confidences
 
     return classes_at
+
+
+@njit(cache=True, nogil=True)
+def _name(at: Any, labels: Any, sure: Any, width: Any, height: Any, found: Any, confidences: Any) -> None:
+    """From polygons to classes, in `found`, and how sure each is; beside the image -1. The last label is of no polygon."""
+    for k in range(len(found)):
+        u, v = at[k, 0], at[k, 1]
+        if u >= -0.5 and v >= -0.5 and u < width - 0.5 and v < height - 0.5:
+            confidences[k] = sure[found[k]]
+            found[k] = labels[found[k]]
+        else:
+            confidences[k] = 0.0
+            found[k] = -1
