@@ -121,6 +121,7 @@ def test_what_is_in_it_fits_together(wallkit, building, tmp_path):
         (("--set", 'missing=[{link="nothing"}]'), "[[missing]] names 'nothing', which is not in the map"),
         (("--set", 'doors=[{joint="gate"}]'), "[[doors]] names 'gate', which is no door"),
         (("--set", "route.waypoints=[[1,1],[99,99]]"), "m from an obstacle"),
+        (("--set", 'meshes=[{of="wall", file="my.obj"}]'), "[[meshes]] of 'wall' has file = 'my.obj': no such file"),
         (("--set", "lidar.frame=lazer"), "there is no frame 'lazer'"),
         (("--robot", "nothing.urdf"), "there is no such robot"),
         (("--seed", "-1"), "seed -1 is negative"),

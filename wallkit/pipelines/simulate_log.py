@@ -8,7 +8,7 @@ import heapq
 import json
 import zlib
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -214,7 +214,12 @@ def recipe(request: LogRequest) -> dict[str, Any]:
         "seed": request.seed,
         "map": {"file": request.map_path.name, "sha256": sha256(request.map_path)},
         "robot": {"file": request.robot_path.name, "sha256": sha256(request.robot_path)},
-        "scenario": table_from(request.scenario),
+        "scenario": table_from(replace(request.scenario, meshes=())),
+        # where they lie decides nothing
+        "meshes": [
+            {**table_from(mesh), "file": Path(mesh.file).name, "sha256": sha256(Path(mesh.file))}
+            for mesh in request.scenario.meshes
+        ],
     }
 
 

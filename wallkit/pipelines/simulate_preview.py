@@ -13,6 +13,7 @@ from wallkit.pipelines.simulate_camera import render
 from wallkit.pipelines.simulate_play import START_NS, Play
 from wallkit.pipelines.simulate_sensors import LidarSensor, sensors_of
 from wallkit.simulate.camera import Shot
+from wallkit.simulate.meshes import corners_of
 from wallkit.simulate.scene import NOTHING
 from wallkit.simulate.world import MAP
 
@@ -93,13 +94,15 @@ def _scan(axes: Any, play: Play, at_ns: int) -> set[int]:
 
 
 def _outlines(play: Play) -> list[Float64Array]:
-    """(4, 2) of every box that stands fast, but floor and ceiling."""
+    """(C, 2) seen from above of every box and mesh that stands fast, but floor and ceiling."""
+    import cv2
+
     found = []
     for solid in play.world.solids:
-        if solid.kind == "box" and solid.body == MAP and solid.class_name not in ("floor", "ceiling"):
-            x, y, _ = np.array(solid.size) / 2
-            corners = np.array([(-x, -y, 0, 1), (x, -y, 0, 1), (x, y, 0, 1), (-x, y, 0, 1)])
-            found.append((corners @ solid.T_body_solid.T)[:, :2])
+        if solid.kind in ("box", "mesh") and solid.body == MAP and solid.class_name not in ("floor", "ceiling"):
+            corners = corners_of(solid) @ solid.T_body_solid.T
+            hull = cv2.convexHull(corners[:, :2].astype(np.float32))
+            found.append(np.asarray(hull[:, 0], dtype=np.float64))
     return found
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from wallkit.core.types import BoolArray, Float64Array, Int64Array
 from wallkit.errors import SimulationError
+from wallkit.simulate.meshes import corners_of
 from wallkit.simulate.world import MAP, Solid, World
 
 CELL_M = 0.1
@@ -158,25 +159,11 @@ def _outline(solid: Solid, T_map_body: Float64Array) -> Float64Array | None:
     """(C, 2) convex outline seen from above of what is in the way; None of what is not."""
     import cv2
 
-    corners = (T_map_body @ solid.T_body_solid @ _extremes(solid).T).T[:, :3]
+    corners = (T_map_body @ solid.T_body_solid @ corners_of(solid).T).T[:, :3]
     if corners[:, 2].max() < _BAND_M[0] or corners[:, 2].min() > _BAND_M[1]:
         return None
     hull = cv2.convexHull(corners[:, :2].astype(np.float32))
     return np.asarray(hull[:, 0], dtype=np.float64)
-
-
-def _extremes(solid: Solid) -> Float64Array:
-    """(C, 4) points whose hull holds the solid."""
-    if solid.kind == "box":
-        half = np.array(solid.size) / 2
-    elif solid.kind == "sphere":
-        half = np.full(3, solid.size[0])
-    elif solid.kind == "mesh":
-        half = np.zeros(3)
-    else:
-        half = np.array([solid.size[0], solid.size[0], solid.size[1] / 2])
-    signs = np.array(np.meshgrid((-1, 1), (-1, 1), (-1, 1))).reshape(3, -1).T
-    return np.column_stack([signs * half, np.ones(8)])
 
 
 def _bounds(world: World, outlines: list[Float64Array]) -> tuple[Float64Array, Float64Array]:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from wallkit.core.config import build, read_toml, section, setting, source_from_words, tables
+from wallkit.core.config import Source, build, read_toml, section, setting, source_from_words, tables
+from wallkit.errors import ConfigError, SimulationError
 from wallkit.simulate.crowd import Crowd
 from wallkit.simulate.looks import Looks
+from wallkit.simulate.meshes import MeshFor, axes_of, bounds_of
 from wallkit.simulate.odometry import WheelOdometry
 from wallkit.simulate.photo import Photo
 from wallkit.simulate.route import Route
@@ -129,13 +131,40 @@ class Scenario:
     moved: tuple[Moved, ...] = tables(Moved, "things that stand elsewhere than the map says")
     missing: tuple[Missing, ...] = tables(Missing, "things that are only in the map")
     extra: tuple[Extra, ...] = tables(Extra, "things that are not in the map")
+    meshes: tuple[MeshFor, ...] = tables(MeshFor, "true shapes of what the map has as boxes, from files of your own")
 
 
 def read_scenario(path: Path | None, words: Sequence[str] = ()) -> Scenario:
     """The scenario of a file, with --set words on top; without a file the defaults.
 
     Raises:
-        ConfigError: an unknown setting or an impossible value, with file, line and the closest name.
+        ConfigError: see scenario_from.
     """
     sources = [read_toml(path)] if path is not None else []
-    return build(Scenario, [*sources, source_from_words(words)])[0]
+    return scenario_from([*sources, source_from_words(words)])
+
+
+def scenario_from(sources: Sequence[Source]) -> Scenario:
+    """The scenario that sources make together, the later ones winning; its meshes are found from the file that names them.
+
+    Raises:
+        ConfigError: an unknown setting or an impossible value, with file, line and the closest name; or a mesh that is not
+            there or cannot be used.
+    """
+    scenario = build(Scenario, sources)[0]
+    named = [source for source in sources if "meshes" in source.table]
+    return replace(scenario, meshes=tuple(_found(mesh, named[-1]) for mesh in scenario.meshes))
+
+
+def _found(mesh: MeshFor, source: Source) -> MeshFor:
+    """The same, its path from here on."""
+    found = replace(mesh, file=str(Path(source.label).parent / mesh.file))
+    try:
+        axes_of(found), bounds_of(Path(found.file))
+    except SimulationError as error:
+        # of several tables the one that names this file
+        lines = (number for number, line in enumerate(source.text.splitlines(), start=1) if mesh.file in line)
+        where = f"{source.label}:{next(lines, 1)}" if mesh.file and source.text else source.label
+        message = f"[[meshes]] of '{mesh.of}' has file = '{mesh.file}': {error.message}"
+        raise ConfigError(message, where=where, hint=error.hint) from error
+    return found

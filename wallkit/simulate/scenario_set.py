@@ -9,7 +9,7 @@ from pathlib import Path
 from wallkit.core.config import build, read_toml, section, setting, tables
 from wallkit.errors import SimulationError, closest
 from wallkit.simulate.crowd import Crowd
-from wallkit.simulate.scenario import Scenario
+from wallkit.simulate.scenario import Scenario, scenario_from
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def takes_of(folder: Path, only: tuple[str, ...] = ()) -> tuple[Take, ...]:
     found: dict[str, Take] = {}
     for scene in story.scenes:
         files = [name for name in (story.sensors, scene.scenario) if name]
-        scenario = build(Scenario, [read_toml(folder / name) for name in files])[0]
+        scenario = scenario_from([read_toml(folder / name) for name in files])
         for level in levels:
             for seed in story.seeds:
                 name = f"{scene.name}-{level.people}-{seed}"

@@ -11,6 +11,7 @@ import numpy as np
 from wallkit.core.types import Float64Array
 from wallkit.errors import SimulationError, closest
 from wallkit.simulate.crowd import People
+from wallkit.simulate.meshes import MeshFor, fitted
 from wallkit.simulate.scenario import DoorPlan, Extra, Moved, Scenario
 from wallkit.simulate.world import MAP, Body, Solid, World, upright
 
@@ -22,7 +23,7 @@ def staged(world: World, scenario: Scenario) -> World:
     """The world with everything that the map does not say, a floor below and a ceiling above.
 
     Raises:
-        SimulationError: the scenario names a thing that is not in the map.
+        SimulationError: the scenario names a thing that is not in the map, or a mesh that cannot be used.
     """
     solids = list(world.solids)
     for missing in scenario.missing:
@@ -32,6 +33,8 @@ def staged(world: World, scenario: Scenario) -> World:
         _check_known(world, moved.link, "moved")
         solids = _with_moved(world, solids, moved)
     solids += [_box(extra) for extra in scenario.extra]
+    if scenario.meshes:
+        solids = _with_meshes(world, solids, scenario.meshes)
     return replace(world, solids=(*solids, *_slabs(world)))
 
 
@@ -89,6 +92,24 @@ def _box(extra: Extra) -> Solid:
     x, y, yaw = extra.at
     place = upright(x, y, yaw, extra.bottom_m + extra.size[2] / 2)
     return Solid(extra.name, extra.class_name, "box", extra.size, place)
+
+
+def _with_meshes(world: World, solids: list[Solid], meshes: tuple[MeshFor, ...]) -> list[Solid]:
+    """All solids, one mesh for all parts of each thing that a mesh is given for; one by name before one by class."""
+    things: dict[str, list[Solid]] = {}
+    for solid in solids:
+        things.setdefault(solid.instance, []).append(solid)
+    known = {name for solid in solids for name in (solid.instance, solid.class_name)}
+    for mesh in meshes:
+        if mesh.of not in known:
+            message = f"[[meshes]] names '{mesh.of}', which is no class or thing in the map"
+            raise SimulationError(message, where=world.source, hint=closest(mesh.of, known))
+    given = {mesh.of: mesh for mesh in meshes}
+    found = []
+    for name, parts in things.items():
+        own = given.get(name) or given.get(parts[0].class_name)
+        found += [fitted(own, parts)] if own else parts
+    return found
 
 
 def _slabs(world: World) -> tuple[Solid, ...]:

@@ -94,6 +94,10 @@ class Studio:
     def _mocap(self) -> dict[str, int]:
         return {body.name: int(self.model.body(body.name).mocapid[0]) for body in self.world.bodies}
 
+    @cached_property
+    def _has_files(self) -> bool:
+        return any(solid.kind == "mesh" for solid in self.world.solids)
+
     def _aimed(self, eye: Pinhole, T_map_optical: Float64Array, seen: tuple[Light, ...]) -> Any:
         """The renderer of a size with its scene seen from a place."""
         mujoco = mujoco_module()
@@ -107,6 +111,8 @@ class Studio:
         option.geomgroup[[GROUPS[light] for light in seen]] = 1
         camera.update_scene(self.data, scene_option=option)
         camera.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = self.wardrobe.looks.shadows
+        # rays meet both sides of a triangle; a file may have them inside out
+        camera.scene.flags[mujoco.mjtRndFlag.mjRND_CULL_FACE] = not self._has_files
         left, right, bottom, top = (_NEAR_M * side for side in eye.frustum)
         # both eyes of the stereo pair are the same one
         for view in camera.scene.camera:
