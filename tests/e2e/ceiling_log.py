@@ -28,7 +28,15 @@ ROUTE = [(2.0, 1.1), (6.0, 1.5), (11.0, 0.9), (12.5, 1.3), (8.0, 1.4), (3.0, 1.0
 
 
 def corridor_ceiling() -> CeilingMap:
-    return painted(3, (15.0, 4.4), origin=(-0.5, -1.0, 0.0))
+    """With boxes of many sizes, so that features are found in it."""
+    import cv2
+
+    ceiling, rng = painted(3, (15.0, 4.4), origin=(-0.5, -1.0, 0.0)), np.random.default_rng(4)
+    for _ in range(500):
+        x, y = rng.integers(0, ceiling.shape[::-1]).tolist()
+        w, h = rng.integers(3, 22, 2).tolist()
+        cv2.rectangle(ceiling.pixels, (x, y), (x + w, y + h), rng.integers(0, 255, 3).tolist(), -1)
+    return ceiling
 
 
 def write_ceiling(folder: Path, ceiling: CeilingMap, name: str = "ceiling") -> Path:

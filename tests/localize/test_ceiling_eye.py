@@ -53,4 +53,6 @@ def test_blurring_lends_no_colour_from_what_is_not_seen():
     pixels = np.full_like(ceiling.pixels, 100)
     pixels[:, 200:] = 255
     blurred = smoothed(replace(ceiling, pixels=pixels, is_seen=seen), 0.1)
-    assert (blurred.pixels[:, :200] == 100).all()
+    assert blurred.resolution_m == 0.04  # no finer than the blur needs
+    assert (blurred.pixels[blurred.is_seen] == 100).all()
+    assert blurred.is_seen.mean() == 0.5

@@ -45,7 +45,7 @@ def test_the_picture_lies_over_the_plan(tmp_path):
 @pytest.mark.parametrize(
     ("text", "place", "message"),
     [
-        ("image: ceiling.png\n", ":1:", r"resolution.*missing.*(\n.*)*ceiling fit LOG --image"),
+        ("image: ceiling.png\n", ":1:", r"resolution.*missing.*(\n.*)*ceiling fit LOG --picture"),
         ("image: ceiling.png\nresolution: -1\n", ":2:", "-1, not a length"),
         ("image: ceiling.png\nresolution: 0.02\norigin: [0, 1]\n", ":3:", "three numbers"),
         ("image: ceiling.png\nresolution: 0.02\nheight: tall\n", ":3:", "height is 'tall'"),

@@ -7,6 +7,7 @@ import click
 import wallkit
 from wallkit.cli.bench import bench
 from wallkit.cli.calib import calib
+from wallkit.cli.ceiling import ceiling
 from wallkit.cli.common import CONTEXT, WallkitGroup
 from wallkit.cli.config import completion, config
 from wallkit.cli.dataset import dataset
@@ -36,7 +37,7 @@ def main() -> None:
 
 
 COMMANDS = (
-    *(demo, log, map_group, calib, model, localize, evaluate, compare, report, simulate, dataset),
+    *(demo, log, map_group, calib, ceiling, model, localize, evaluate, compare, report, simulate, dataset),
     *(bench, config, completion, doctor),
 )
 for command in COMMANDS:

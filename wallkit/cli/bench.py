@@ -8,6 +8,7 @@ import click
 
 from wallkit.cli import common
 from wallkit.cli.bench_boards import boards
+from wallkit.cli.bench_ceiling import ceiling
 from wallkit.cli.bench_covariance import covariance
 from wallkit.cli.bench_points import bench_filter, polygons
 
@@ -19,6 +20,7 @@ def bench() -> None:
 
 bench.add_command(boards)
 bench.add_command(covariance)
+bench.add_command(ceiling)
 bench.add_command(polygons)
 bench.add_command(bench_filter)
 

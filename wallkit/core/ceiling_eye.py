@@ -137,18 +137,21 @@ class CeilingEye:
         sigma = self.smooth_m * self.px_per_m
         if sigma > 0.4:
             image = np.asarray(cv2.GaussianBlur(image, (0, 0), sigma))
-        at = np.where(self.is_seen[..., None], self.pixels, -10).reshape(1, -1, 2)
-        at = np.concatenate([at, self.centre_px[None, None]], axis=1).astype(np.float32)
-        sampled = cv2.remap(image, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        colours = sampled.reshape(-1, 3).astype(np.float32) / np.float32(255)
-        grid = np.where(self.is_seen[..., None], colours[:-1].reshape(*self.is_seen.shape, 3), np.float32(0))
-        return CeilingView(stamp_ns, self.points_m, grid, self.is_seen, self.centre_m, colours[-1])
+        at = np.where(self.is_seen[..., None], self.pixels, -10).astype(np.float32)
+        colours = cv2.remap(image, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        grid = np.where(self.is_seen[..., None], colours.reshape(*at.shape[:2], 3).astype(np.float32) / 255, 0)
+        u, v = self.centre_px.astype(np.float32)[:, None, None]
+        centre = cv2.remap(image, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).reshape(3) / np.float32(255)
+        return CeilingView(stamp_ns, self.points_m, grid.astype(np.float32), self.is_seen, self.centre_m, centre)
 
 
 def smoothed(ceiling: CeilingMap, sigma_m: float) -> CeilingMap:
-    """The ceiling blurred by a Gaussian; what is not seen lends no colour."""
+    """The ceiling blurred by a Gaussian; what is not seen lends no colour. Pixels far finer than the blur are merged."""
     import cv2
 
+    step = int(sigma_m / 2 / ceiling.resolution_m)
+    if step >= 2:
+        ceiling = _merged(ceiling, step)
     sigma = sigma_m / ceiling.resolution_m
     if sigma < 0.4:
         return ceiling
@@ -156,3 +159,18 @@ def smoothed(ceiling: CeilingMap, sigma_m: float) -> CeilingMap:
     share = np.maximum(cv2.GaussianBlur(known, (0, 0), sigma), 1e-6)
     blurred = cv2.GaussianBlur(ceiling.pixels.astype(np.float32) * known[..., None], (0, 0), sigma) / share[..., None]
     return replace(ceiling, pixels=np.clip(np.rint(blurred), 0, 255).astype(np.uint8))
+
+
+def _merged(ceiling: CeilingMap, step: int) -> CeilingMap:
+    """The ceiling with step x step pixels made one, their mean; a rest at the upper and right edge is left out."""
+    rows, columns = (side // step for side in ceiling.shape)
+    known = ceiling.is_seen[: rows * step, : columns * step].reshape(rows, step, columns, step).astype(np.float32)
+    pixels = ceiling.pixels[: rows * step, : columns * step].reshape(rows, step, columns, step, 3)
+    share = known.sum(axis=(1, 3))
+    means = (pixels * known[..., None]).sum(axis=(1, 3)) / np.maximum(share, 1)[..., None]
+    return replace(
+        ceiling,
+        pixels=np.rint(means).astype(np.uint8),
+        is_seen=share > step * step / 2,
+        resolution_m=step * ceiling.resolution_m,
+    )

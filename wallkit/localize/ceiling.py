@@ -17,7 +17,7 @@ from wallkit.core.config import choice, setting
 from wallkit.core.grid import placed
 from wallkit.core.types import BoolArray, Float32Array, Float64Array
 from wallkit.errors import MapError
-from wallkit.localize.ceiling_kernels import colour_costs, exposed_costs, gradient_costs, histogram_costs
+from wallkit.localize.ceiling_kernels import UNKNOWN, colour_costs, exposed_costs, gradient_costs, histogram_costs
 from wallkit.localize.colours import CIRCLES, SPACES
 from wallkit.localize.kernels import in_threads
 
@@ -98,21 +98,23 @@ class Patch:
 
     def on(self, ceiling: CeilingMap, *, threads: int = 1) -> CeilingLikelihood:
         """See CeilingModel."""
-        return _Patch(self, ceiling, _image_of(ceiling, self.space), threads)
+        _check_colour(ceiling)
+        image = _packed(ceiling) if self.space == "rgb" else _image_of(ceiling, self.space)
+        return _Patch(self, ceiling, image, threads)
 
 
 @dataclass(frozen=True)
 class _Patch:
     settings: Patch
     ceiling: CeilingMap
-    image: Float32Array
+    image: Any
     threads: int
 
     def log_likelihood(self, poses: Float64Array, view: CeilingView) -> Float64Array:
         """See CeilingLikelihood."""
         if not view.is_seen.any():
             return np.zeros(len(poses))
-        limit = self.settings.exposure if self.settings.space == "rgb" else 1.0
+        limit = self.settings.exposure if self.settings.space == "rgb" else None
         return _colour_log(self, poses, view.points_m[view.is_seen], view.colours[view.is_seen], limit)
 
 
@@ -129,8 +131,9 @@ class Gradient:
 
     def on(self, ceiling: CeilingMap, *, threads: int = 1) -> CeilingLikelihood:
         """See CeilingModel."""
-        values = np.repeat(_log_brightness(_unit(ceiling.pixels))[..., None], 3, axis=2)
-        return _Gradient(self, ceiling, _bordered(values, ceiling.is_seen), threads)
+        values = np.where(ceiling.is_seen, _log_brightness(_unit(ceiling.pixels)), 2 * UNKNOWN)
+        image = np.ascontiguousarray(np.pad(values, 1, constant_values=2 * UNKNOWN), dtype=np.float32)
+        return _Gradient(self, ceiling, image, threads)
 
 
 @dataclass(frozen=True)
@@ -227,14 +230,14 @@ class _Histogram:
 
 
 def _colour_log(
-    model: Any, poses: Float64Array, points_m: Any, colours: Float32Array, exposure: float = 1.0
+    model: Any, poses: Float64Array, points_m: Any, colours: Float32Array, exposure: float | None = None
 ) -> Float64Array:
     """-mean cost / T of colours (K, 3) at places (K, 2) of frame base."""
     s, out = model.settings, np.zeros(len(poses))
     points = np.ascontiguousarray((np.asarray(points_m).T / model.ceiling.resolution_m).astype(np.float32))
     values = np.ascontiguousarray(SPACES[s.space](colours.astype(np.float32)).T)
-    kernel: Any = colour_costs if exposure == 1 else exposed_costs
-    how = s.space in CIRCLES if exposure == 1 else np.float32(exposure)
+    kernel: Any = colour_costs if exposure is None else exposed_costs
+    how = s.space in CIRCLES if exposure is None else np.float32(exposure)
     args = (points, values, np.float32(s.order), how, np.float32(s.most), np.float32(s.unseen), model.image)
     in_threads(kernel, _placed(model.ceiling, poses), args, out, model.threads)
     return np.asarray(-out / s.temperature)
@@ -253,6 +256,13 @@ def _bordered(values: Float32Array, is_seen: BoolArray) -> Float32Array:
     """(H + 2, W + 2, 4): three values and whether they are known, with an unknown border."""
     image = np.concatenate([values, is_seen[..., None].astype(np.float32)], axis=2)
     return np.ascontiguousarray(np.pad(image, ((1, 1), (1, 1), (0, 0))), dtype=np.float32)
+
+
+def _packed(ceiling: CeilingMap) -> Any:
+    """(H + 2, W + 2) uint32: red, green, blue and 1 where it is known, with an unknown border."""
+    planes = np.dstack([ceiling.pixels, ceiling.is_seen.astype(np.uint8)])
+    ringed = np.ascontiguousarray(np.pad(planes, ((1, 1), (1, 1), (0, 0))))
+    return ringed.view("<u4")[..., 0].copy()
 
 
 def _unit(pixels: Any) -> Float32Array:

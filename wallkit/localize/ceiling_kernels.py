@@ -13,7 +13,9 @@ import numpy as np
 from numba import njit
 
 _f4 = np.float32
-_ZERO, _HALF, _ONE, _TWO = _f4(0.0), _f4(0.5), _f4(1.0), _f4(2.0)
+_ZERO, _ONE, _TWO, _BYTE = _f4(0.0), _f4(1.0), _f4(2.0), _f4(1.0 / 255.0)
+# of a log brightness: there is none so low
+UNKNOWN = _f4(-100.0)
 
 
 @njit(fastmath=True, inline="always")
@@ -73,41 +75,47 @@ def exposed_costs(
 
     g is the ratio of the summed brightness of view and map, twice more over the pixels that it explains: walls and lamps
     that are off must not rule. The costs are those of colours / g.
+
+    Args:
+        image: (H, W) uint32 of red, green, blue and 1 where it is known, a byte each from the lowest: a whole floor of them
+            stays in the cache, which four floats a pixel do not.
     """
-    height, width = image.shape[0], image.shape[1]
-    flat = image.reshape(-1, 4)
+    height, width = image.shape
+    flat = image.reshape(-1)
     x_last, y_last, row = _f4(width - 1), _f4(height - 1), np.int32(width)
     px, py, z0, z1, z2 = points[0], points[1], colours[0], colours[1], colours[2]
     count = px.shape[0]
     bright = _f4(0.299) * z0 + _f4(0.587) * z1 + _f4(0.114) * z2
-    cells, shade = np.empty(count, np.uint32), np.empty(count, np.float32)
+    packed, m = np.empty(count, np.uint32), np.empty((5, count), np.float32)
+    rounds = 2 if limit > _ONE else 0
     for i in range(placed.shape[1]):
         c, s, x0, y0 = placed[0, i], placed[1, i], placed[2, i], placed[3, i]
-        above, below = _f4(1e-6), _f4(1e-6)
         for k in range(count):
             x = min(max(x0 + c * px[k] - s * py[k], _ZERO), x_last)
             y = min(max(y0 + s * px[k] + c * py[k], _ZERO), y_last)
-            cell = np.uint32(np.int32(y) * row + np.int32(x))
-            seen = flat[cell, 3]
-            shade[k] = seen * (_f4(0.299) * flat[cell, 0] + _f4(0.587) * flat[cell, 1] + _f4(0.114) * flat[cell, 2])
-            cells[k] = cell
-            above += seen * bright[k]
-            below += shade[k]
+            packed[k] = flat[np.uint32(np.int32(y) * row + np.int32(x))]
+        above, below = _f4(1e-6), _f4(1e-6)
+        for k in range(count):
+            v = packed[k]
+            m[0, k] = _f4(np.int32(v & np.uint32(255))) * _BYTE
+            m[1, k] = _f4(np.int32((v >> np.uint32(8)) & np.uint32(255))) * _BYTE
+            m[2, k] = _f4(np.int32((v >> np.uint32(16)) & np.uint32(255))) * _BYTE
+            m[3, k] = _f4(np.int32(v >> np.uint32(24)))
+            m[4, k] = m[3, k] * (_f4(0.299) * m[0, k] + _f4(0.587) * m[1, k] + _f4(0.114) * m[2, k])
+            above += m[3, k] * bright[k]
+            below += m[4, k]
         g = min(max(above / below, _ONE / limit), limit)
-        for _ in range(2):
+        for _ in range(rounds):
             above, below = _f4(1e-6), _f4(1e-6)
             for k in range(count):
-                fits = _f4(abs(bright[k] - g * shade[k]) < most) * flat[cells[k], 3]
+                fits = m[3, k] if abs(bright[k] - g * m[4, k]) < most else _ZERO
                 above += fits * bright[k]
-                below += fits * shade[k]
+                below += fits * m[4, k]
             g = min(max(above / below, _ONE / limit), limit)
         total, per = _ZERO, _ONE / g
         for k in range(count):
-            cell = cells[k]
-            d0, d1 = abs(z0[k] * per - flat[cell, 0]), abs(z1[k] * per - flat[cell, 1])
-            d = _norm(d0, d1, abs(z2[k] * per - flat[cell, 2]), order)
-            seen = flat[cell, 3]
-            total += seen * min(d, most) + (_ONE - seen) * unseen
+            d = _norm(abs(z0[k] * per - m[0, k]), abs(z1[k] * per - m[1, k]), abs(z2[k] * per - m[2, k]), order)
+            total += m[3, k] * min(d, most) + (_ONE - m[3, k]) * unseen
         out[i] = total / _f4(count)
 
 
@@ -117,14 +125,15 @@ def gradient_costs(
 ) -> None:
     """out[i] = mean over neighbours a, b of the grid of min(|(values[a] - m[a]) - (values[b] - m[b])|, most).
 
-    m is the image's first channel at the points seen from pose i: what is added to all values changes nothing.
+    m is the image at the points seen from pose i: what is added to all values changes nothing.
 
     Args:
         points: (2, R, C) float32, in frame base, in pixels. values: (R, C) float32. seen: (R, C) float32 of 0 or 1.
-        placed, most, unseen, image, out: as `colour_costs`.
+        image: (H, W) float32, far below any value where it is not known, with a border of such.
+        placed, most, unseen, out: as `colour_costs`.
     """
-    height, width = image.shape[0], image.shape[1]
-    flat = image.reshape(-1, 4)
+    height, width = image.shape
+    flat = image.reshape(-1)
     x_last, y_last, row = _f4(width - 1), _f4(height - 1), np.int32(width)
     px, py = points[0], points[1]
     rows, columns = values.shape
@@ -137,9 +146,9 @@ def gradient_costs(
             for b in range(columns):
                 x = min(max(x0 + c * px[a, b] - s * py[a, b], _ZERO), x_last)
                 y = min(max(y0 + s * px[a, b] + c * py[a, b], _ZERO), y_last)
-                cell = np.uint32(np.int32(y) * row + np.int32(x))
-                known = flat[cell, 3]
-                rest = values[a, b] - flat[cell, 0]
+                value = flat[np.uint32(np.int32(y) * row + np.int32(x))]
+                known = _ONE if value > UNKNOWN else _ZERO
+                rest = values[a, b] - value
                 if b > 0:
                     both = is_left * known
                     weight = seen[a, b] * seen[a, b - 1]

@@ -18,7 +18,7 @@ from wallkit.errors import MapError
 from wallkit.maps.grids.raster import number_in, read_yaml
 
 PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
-_FIT = "`wallkit ceiling fit LOG --image {} -o ceiling.yaml` finds it from a log that saw this ceiling"
+_FIT = "`wallkit ceiling fit LOG --picture {} -o ceiling.yaml` finds it from a log that saw this ceiling"
 
 
 def read_ceiling(path: Path) -> CeilingMap:
