@@ -163,3 +163,10 @@ def test_the_command_itself_runs(tmp_path):
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith("wrote oracle.onnx, 4.8 kB: yolo-anchors, 320 x 320 px\n  wall ")
+
+
+def test_the_model_of_the_package_is_called_default(wallkit, pictures):
+    done = wallkit("model", "inspect", "default", "--require", "wall,door,person", "--json")
+    assert (done.code, done.json["licence"]) == (0, "Apache-2.0")
+    done = wallkit("model", "bench", "default", "--images", pictures, "--rounds", "2", "--rate", "0.1", "--json")
+    assert (done.code, done.json["rows"][0]["model"]) == (0, "default.onnx")

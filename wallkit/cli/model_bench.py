@@ -132,7 +132,8 @@ def _is_busy(row: ModelTime) -> bool:
 
 
 def _threads(row: ModelTime) -> str:
-    return "1 thread" if row.threads == 1 else f"{row.threads} threads"
+    spinning = ", spinning" if row.is_spinning else ""
+    return "1 thread" if row.threads == 1 else f"{row.threads} threads{spinning}"
 
 
 _HEADERS = ("decode", "prepare", "network", "read", "points")

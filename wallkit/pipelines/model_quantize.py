@@ -77,7 +77,7 @@ def quantise_model(
     is_good = agreement.share >= min_match
     if is_good:
         write_whole(out, data)
-    sizes = path.stat().st_size, len(data)
+    sizes = segmenter.model.path.stat().st_size, len(data)
     return Quantised(agreement, len(calibrating), len(judging), is_same, kept, *sizes, times, is_good)
 
 
