@@ -97,6 +97,12 @@ def test_heavy_imports_stay_inside_functions(path):
     assert third_party <= allowed, f"{path.name} imports {third_party} when it is imported"
 
 
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_nothing_imports_what_is_agpl(path):
+    """Ultralytics is asked in another interpreter, by files."""
+    assert not {name for name in imports(path, top_only=False) if name.split(".")[0] == "ultralytics"}
+
+
 def test_help_imports_nothing_heavy():
     heavy = sorted(HEAVY | {"numpy", "numba", "scipy"})
     code = f"""
