@@ -17,6 +17,7 @@ from wallkit.pipelines.outputs import check_out, put_in_place
 from wallkit.pipelines.run_folder import write_json
 from wallkit.train.curves import Epoch, csv_of, draw_curves
 from wallkit.train.pictures import Pictures, stacked
+from wallkit.train.score import ClassScore, scores_of
 
 if TYPE_CHECKING:
     from wallkit.train.learn import Lesson
@@ -93,15 +94,22 @@ def train_model(
     checkpoint = working / "checkpoint.pt"
     learnt = learn(train, val, names, lesson, checkpoint, told=hear)
     parameters = parameters_of(learnt.net)
-    about = _about(sets, learnt.epochs[-1], parameters)
+    about = _about(sets, scores_of(learnt.matrix, names), parameters)
     exported = export_onnx(learnt.net, names, lesson.size, working / "model.onnx", about=about)
     judged = evaluate_model(working / "model.onnx", sets[0].folder, "val", sheet=working / "masks.png")
     (working / "curves.csv").write_text(csv_of(learnt.epochs), encoding="utf-8")
     pictures = f"{len(train)} pictures, {len(val)} of other scenes for validation"
     draw_curves(learnt.epochs, working / "curves.png", title=f"{parameters / 1e6:.2f} M parameters on {pictures}")
     write_json(working / "scores.json", {"schema": 1, **judged.document})
-    export = asdict(exported)
-    write_json(working / "run.json", {"schema": 1, "command": "model train", **fingerprint, "export": export})
+    balanced = dict(zip(names, learnt.added.round(3).tolist(), strict=True))
+    record = {
+        "schema": 1,
+        "command": "model train",
+        **fingerprint,
+        "added_to_scores": balanced,
+        "export": asdict(exported),
+    }
+    write_json(working / "run.json", record)
     checkpoint.unlink()
     (working / "request.json").unlink()
     put_in_place(working, out)
@@ -171,10 +179,10 @@ def _pictures(sets: tuple[TrainingSet, ...], split: str, size: tuple[int, int]) 
     return stacked(pairs, size)
 
 
-def _about(sets: tuple[TrainingSet, ...], last: Epoch, parameters: int) -> dict[str, str]:
+def _about(sets: tuple[TrainingSet, ...], scores: tuple[ClassScore, ...], parameters: int) -> dict[str, str]:
     """What the file says of itself."""
     kinds = sorted({one.kind for one in sets})
-    shown = {name: round(iou, 3) for name, iou in last.ious.items() if iou == iou}
+    shown = {score.name: round(score.iou, 3) for score in scores if score.iou == score.iou}
     return {
         "description": f"wallkit's own semantic network, {parameters} parameters, trained on {' and '.join(kinds)} pictures",
         "author": "wallkit",

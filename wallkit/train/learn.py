@@ -19,6 +19,7 @@ from torch.nn import functional
 
 from wallkit.core.types import Float64Array, Int64Array
 from wallkit.train.augment import Changes, changed
+from wallkit.train.balance import balancing
 from wallkit.train.curves import Epoch
 from wallkit.train.network import MULTIPLE, STRIDE, SemanticNet
 from wallkit.train.pictures import UNLABELLED, Pictures, class_weights, pixel_counts, showing_odds
@@ -53,11 +54,17 @@ class Lesson:
 
 @dataclass(frozen=True, eq=False)
 class Learnt:
-    """A network in evaluation mode, the figures of every epoch, and the (C, C) confusion of the last one."""
+    """What was learnt.
+
+    Attributes:
+        net: in evaluation mode. epochs: the figures of every one.
+        matrix: (C, C) confusion on the validation pictures. added: (C,) to the scores of each class, see `balance`.
+    """
 
     net: SemanticNet
     epochs: tuple[Epoch, ...]
     matrix: Int64Array
+    added: Float64Array
 
 
 def learn(
@@ -91,7 +98,6 @@ def learn(
     state = _State(net, mean, optimiser, cycle)
     done = state.load(checkpoint) if checkpoint.exists() else []
     other = list(names).index("other") if "other" in names else UNLABELLED
-    matrix = np.zeros((len(names), len(names)), dtype=np.int64)
     for number in range(len(done), lesson.epochs):
         size = _size(lesson, number)
         losses = []
@@ -112,9 +118,25 @@ def learn(
         done.append(epoch)
         state.save(checkpoint, done)
         told(epoch)
-    if not matrix.any():
-        _, matrix = judged(mean, val, len(names), weights, lesson)
-    return Learnt(mean.cpu().eval(), tuple(done), matrix)
+    added = balance(mean, val, tuple(names), lesson.batch)
+    _, matrix = judged(mean, val, len(names), weights, lesson)
+    return Learnt(mean.cpu().eval(), tuple(done), matrix, added)
+
+
+@torch.no_grad()
+def balance(net: SemanticNet, pictures: Pictures, names: tuple[str, ...], batch: int) -> Float64Array:
+    """(C,) what `balancing` finds on every ninth score of pictures; the network's last layer is changed by it."""
+    net.eval()
+    device = net.head.weight.device
+    scores, truth = [], []
+    for start in range(0, len(pictures), batch):
+        given = net(_tensor(pictures.images[start : start + batch]).to(device))[..., ::3, ::3]
+        scores.append(given.movedim(1, -1).reshape(-1, len(names)).float().cpu().numpy())
+        truth.append(pictures.classes[start : start + batch, :: 3 * STRIDE, :: 3 * STRIDE].ravel())
+    added = balancing(np.concatenate(scores), np.concatenate(truth), names)
+    # a class has one channel for each pixel under a score of the decoder
+    net.head.bias += torch.from_numpy(added).to(net.head.bias).repeat_interleave(STRIDE * STRIDE)
+    return added
 
 
 @torch.no_grad()
