@@ -60,10 +60,11 @@ def test_walls_of_a_building_that_nobody_has_seen_are_found(tmp_path):
     simulate_dataset(request, tmp_path / "unseen")
     judged = evaluate_model(DEFAULT, tmp_path / "unseen", "all")
     ious = {score.name: score.iou for score in judged.scores}
-    # on 490 pictures of 70 buildings WALLS and FLOOR, see the card; 16 of two spread more
-    assert ious["wall + partition"] > 0.7
-    assert ious["floor"] > 0.6
-    assert judged.document["pixel_accuracy"] > 0.7
+    # the card says 0.89, 0.89, 0.74 on 490 pictures of 70 buildings, and these are 0.92, 0.94, 0.82; renderers differ a little
+    assert ious["wall + partition"] > 0.85
+    assert ious["floor"] > 0.85
+    assert ious["door"] > 0.65
+    assert judged.document["pixel_accuracy"] > 0.85
 
 
 def test_the_wall_of_a_real_photograph(data):
