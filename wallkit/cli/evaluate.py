@@ -120,20 +120,35 @@ def compare(
 @click.option(
     "-o", "--out", type=click.Path(path_type=Path), metavar="FILE.html", help="Default: report.html in the run."
 )
+@click.option(
+    "--animate",
+    type=click.Path(path_type=Path),
+    metavar="FILE.gif",
+    help="Its particles at a few moments, and no page.",
+)
 @common.config_option
 @common.set_option
 @common.seed_option
-def report(runs: tuple[Path, ...], truth: Path | None, out: Path | None, **flags: Any) -> None:
-    """Draw the page of a run again, or one page of several.
+def report(runs: tuple[Path, ...], truth: Path | None, out: Path | None, animate: Path | None, **flags: Any) -> None:
+    """Draw the page of a run again, or one page of several, or how its particles gather.
 
     \b
     Examples:
       wallkit report log.wallkit --truth mocap.tum -o with-truth.html
       wallkit report a/ b/ --out report.html
+      wallkit report log.wallkit --animate cloud.gif
     """
     from wallkit.pipelines.report import compare_runs, write_compare_report, write_run_report
 
     settings = _settings(flags["config_path"], flags["words"], None)
+    if animate is not None:
+        from wallkit.pipelines.animate import write_animation
+
+        if len(runs) > 1 or out is not None:
+            raise click.UsageError("--animate draws one run, and nothing else")
+        moments = write_animation(animate, load_seeds(runs[0], settings, truth)[0][0])
+        click.echo(f"animated {animate}: {moments} moments")
+        return
     if len(runs) == 1:
         record, evaluation = load_seeds(runs[0], settings, truth)[0]
         out = out or runs[0] / "report.html"

@@ -195,7 +195,8 @@ def _answer(run: Run, evaluation: Evaluation) -> dict[str, Any]:
 def _provenance(run: Run, loaded: LoadedConfig) -> dict[str, Any]:
     """run.json: what was run on what, with which settings, and what was dropped."""
     p = run.prepared
-    files = _files_of([*p.request.logs, *p.map.files])
+    overhead = [] if p.overhead is None else [p.overhead.path]
+    files = _files_of([*p.request.logs, *p.map.files, *overhead])
     return {
         "schema": 1,
         "wallkit": wallkit.__version__,
@@ -203,6 +204,7 @@ def _provenance(run: Run, loaded: LoadedConfig) -> dict[str, Any]:
         "seed": p.request.seed,
         "logs": [str(path) for path in p.request.logs],
         "map": p.map.grid.source,
+        "ceiling": str(overhead[0]) if overhead else None,
         "scan": p.rig.scan.topic,
         "odometry": str(p.rig.odometry),
         "lidar_mount": p.rig.mount.source,
