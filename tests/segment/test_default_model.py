@@ -60,7 +60,7 @@ def test_walls_of_a_building_that_nobody_has_seen_are_found(tmp_path):
     simulate_dataset(request, tmp_path / "unseen")
     judged = evaluate_model(DEFAULT, tmp_path / "unseen", "all")
     ious = {score.name: score.iou for score in judged.scores}
-    # the card says 0.89, 0.89, 0.74 on 490 pictures of 70 buildings, and these are 0.92, 0.94, 0.82; renderers differ a little
+    # the card says 0.89, 0.89, 0.74 for 70 buildings, and here it was 0.92, 0.94, 0.82; renderers differ a little
     assert ious["wall + partition"] > 0.85
     assert ious["floor"] > 0.85
     assert ious["door"] > 0.65
