@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from wallkit.calib.board_pose import pose_of_board
-from wallkit.calib.boards import board_from
+from wallkit.calib.boards import board_from, opencv_board
 from wallkit.calib.detect import find_corners
 from wallkit.calib.scan_files import read_scan
 from wallkit.errors import SimulationError
@@ -63,6 +63,29 @@ def test_corners_in_simulated_pictures_are_where_the_truth_projects_them(gl):
     assert len(errors) > 60
     assert np.abs(errors.mean(axis=0)).max() < 0.02
     assert np.sqrt((errors**2).mean()) < 0.1
+
+
+def test_small_charuco_squares_are_refined_in_more_than_opencvs_single_pixel(gl):
+    """Markers of 3/4 of a square begin two pixels from the corners of squares of 14 px."""
+    from cv2 import aruco
+
+    board = board_from("charuco:10x7:0.039:0.03:5X5_100")
+    request = BoardRequest(board, Scenario(cameras=(LENS,)), BoardPoses(6, 0.8, 1.2, 30.0, anywhere=True), seed=1)
+    robot = robot_from_urdf()
+    unit = unit_of(robot, LENS)
+    own, opencvs = [], []
+    for held in captures(request, robot, unit, each=1):
+        grey = cv2.cvtColor(held.image, cv2.COLOR_RGB2GRAY)
+        found, T = find_corners(grey, board), held.T_camera_board
+        if found is None:
+            continue
+        truth = unit.true.project(board.object_points @ T[:3, :3].T + T[:3, 3])
+        own.append(found.pixels - truth[found.ids])
+        pixels, ids, _, _ = aruco.CharucoDetector(opencv_board(board)).detectBoard(grey)
+        opencvs.append(pixels.reshape(-1, 2) - truth[ids.ravel()])
+    rms = [float(np.sqrt((np.concatenate(errors) ** 2).mean())) for errors in (own, opencvs)]
+    assert len(np.concatenate(own)) > 60
+    assert rms[0] < 0.8 * rms[1], rms
 
 
 def test_a_board_in_pictures_is_as_large_and_as_far_as_it_truly_is(gl):
