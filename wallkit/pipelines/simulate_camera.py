@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
 from wallkit.core.camera import Camera
 from wallkit.core.geometry import matrix_from_pose
-from wallkit.core.types import CameraImage, CameraInfo, Float64Array, Int64Array
-from wallkit.pipelines.simulate_play import Message, Play
-from wallkit.simulate.camera import Masks, Shot, Unit, photograph, shot_of, solids_by_raster, solids_by_rays
-from wallkit.simulate.photo import jpeg_from_pixels
+from wallkit.core.types import CameraImage, CameraInfo, Float64Array, Int64Array, UInt8Array
+from wallkit.pipelines.simulate_play import START_NS, Message, Play
+from wallkit.simulate.camera import Masks, Shot, Unit, exposed, shot_of, solids_by_raster, solids_by_rays
+from wallkit.simulate.photo import developed, jpeg_from_pixels
 from wallkit.simulate.scenario import CameraSetup
 from wallkit.simulate.scene import NOTHING
 from wallkit.simulate.timing import NEVER, Schedule
@@ -50,23 +51,50 @@ def render(
             return T_map_optical
         return np.asarray(matrix_from_pose(play.pose_at(now_ns)) @ unit.T_base_true)
 
+    def exposed_at(now_ns: int) -> UInt8Array:
+        times = _open_shutter(unit, now_ns)
+        places = [place_of_camera(t) for t in times]
+        return exposed(play.studio, unit, places, lambda k: play.place_studio(times[k]))
+
+    def solids_at(now_ns: int, rows: slice) -> Int64Array:
+        T = place_of_camera(now_ns)
+        if masks == "exact":
+            play.place(now_ns)
+            return solids_by_rays(play.scene, unit, T, rows)
+        play.place_studio(now_ns)
+        return solids_by_raster(play.studio, unit, T)[rows]
+
     image = None
     if pictures:
-        times = _open_shutter(unit, at_ns)
+        light = _by_strips(unit, at_ns, lambda now_ns, rows: exposed_at(now_ns)[rows])
         rng = np.random.default_rng([play.seed, zlib.crc32(unit.name.encode()), at_ns])
-        image = photograph(
-            rng, play.studio, unit, [place_of_camera(t) for t in times], lambda k: play.place_studio(times[k])
-        )
-    T = place_of_camera(at_ns)
-    if masks == "exact":
-        play.place(at_ns)
-        solids = solids_by_rays(play.scene, unit, T)
-    elif masks == "raster":
-        play.place_studio(at_ns)
-        solids = solids_by_raster(play.studio, unit, T)
-    else:
+        image = developed(rng, unit.photo, light, metered=_metered(unit, at_ns, exposed_at))
+    if masks == "none":
         solids = np.full((unit.true.height, unit.true.width), NOTHING, dtype=np.int64)
+    else:
+        solids = _by_strips(unit, at_ns, solids_at)
     return shot_of(play.scene, image, solids)
+
+
+def _by_strips(unit: Unit, at_ns: int, shown: Callable[[int, slice], np.ndarray]) -> np.ndarray:
+    """What is shown of all rows at a moment; of a rolling shutter, which reads rows from the top on, each strip's own."""
+    height, photo = unit.true.height, unit.photo
+    if photo.readout_s == 0:
+        return shown(at_ns, slice(height))
+    edges = np.round(np.linspace(0, height, photo.strips + 1)).astype(int).tolist()
+    return np.concatenate(
+        [
+            shown(at_ns + round(((a + b) / 2 / height - 0.5) * photo.readout_s * 1e9), slice(a, b))
+            for a, b in pairwise(edges)
+        ]
+    )
+
+
+def _metered(unit: Unit, at_ns: int, exposed_at: Callable[[int], UInt8Array]) -> UInt8Array | None:
+    """What auto exposure goes by; None for the picture itself. Before the log begins, nothing has changed."""
+    if unit.photo.exposure_lag_s == 0 or unit.photo.auto_exposure == 0:
+        return None
+    return exposed_at(max(min(at_ns, START_NS), at_ns - round(unit.photo.exposure_lag_s * 1e9)))
 
 
 def _open_shutter(unit: Unit, at_ns: int) -> list[int]:

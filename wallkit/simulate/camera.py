@@ -85,6 +85,20 @@ def photograph(
     Raises:
         SimulationError: no OpenGL works.
     """
+    return developed(rng, unit.photo, exposed(studio, unit, T_map_optical, place))
+
+
+def exposed(
+    studio: Studio,
+    unit: Unit,
+    T_map_optical: Sequence[Float64Array],
+    place: Callable[[int], None] = lambda _: None,
+) -> UInt8Array:
+    """The same before it is developed: what the lens lets through.
+
+    Raises:
+        SimulationError: no OpenGL works.
+    """
     import cv2
 
     optics, total = unit.optics, None
@@ -94,18 +108,18 @@ def photograph(
         if optics.columns is not None and optics.rows is not None:
             sheet = cv2.remap(sheet, optics.columns, optics.rows, cv2.INTER_CUBIC, borderMode=cv2.BORDER_CONSTANT)
         if len(T_map_optical) == 1:
-            return developed(rng, unit.photo, sheet)
+            return np.asarray(sheet)
         total = sheet.astype(np.float32) if total is None else total + sheet
     assert total is not None
-    return developed(rng, unit.photo, np.asarray(total / len(T_map_optical) + 0.5).astype(np.uint8))
+    return np.asarray(total / len(T_map_optical) + 0.5).astype(np.uint8)
 
 
-def solids_by_rays(scene: Scene, unit: Unit, T_map_optical: Float64Array) -> Int64Array:
-    """(H, W) the solid that each pixel's middle shows, NOTHING for none: exact, and without OpenGL."""
-    optics = unit.optics
-    found = np.full(optics.sees.shape, NOTHING, dtype=np.int64)
-    rays = optics.rays[optics.sees] @ T_map_optical[:3, :3].T
-    found[optics.sees] = scene.cast(T_map_optical[:3, 3], rays, unseen=_unseen(unit.glass), is_camera=True).solids
+def solids_by_rays(scene: Scene, unit: Unit, T_map_optical: Float64Array, rows: slice = slice(None)) -> Int64Array:
+    """(H, W) the solid that each pixel's middle shows, NOTHING for none; or some rows of it: exact, and without OpenGL."""
+    sees = unit.optics.sees[rows]
+    found = np.full(sees.shape, NOTHING, dtype=np.int64)
+    rays = unit.optics.rays[rows][sees] @ T_map_optical[:3, :3].T
+    found[sees] = scene.cast(T_map_optical[:3, 3], rays, unseen=_unseen(unit.glass), is_camera=True).solids
     return found
 
 

@@ -29,24 +29,38 @@ class Photo:
     defocus_px: float = setting(0.0, "sigma of a lens out of focus", low=0, high=20)
     exposure_s: float = setting(0.0, "the shutter stays open so long, and what moves is blurred", low=0, high=1)
     exposures: int = setting(4, "pictures that are averaged while the shutter is open", low=2, high=64)
+    exposure_lag_s: float = setting(0.0, "auto exposure goes by the light of so long ago", low=0, high=10)
+    readout_s: float = setting(
+        0.0, "rolling shutter: from reading the first row to the last; the stamp is the middle one's", low=0, high=1
+    )
+    strips: int = setting(8, "rows are read in so many strips, each a picture of its own moment", low=2, high=64)
     variety: float = setting(0.0, "how far all of this differs by chance between pictures", low=0, high=1)
     jpeg_quality: int = setting(90, "of the recorded JPEG", low=1, high=100)
 
 
 PERFECT = Photo(auto_exposure=0.0, vignette=0.0, read_noise=0.0, shot_noise=0.0, jpeg_quality=95)
+# what is no matter of one picture in its own light
+_OF_TIME: dict[str, Any] = {
+    name: getattr(PERFECT, name)
+    for name in ("exposure_s", "exposures", "exposure_lag_s", "readout_s", "strips", "jpeg_quality")
+}
 
 
-def developed(rng: np.random.Generator, photo: Photo, image: UInt8Array) -> UInt8Array:
-    """(H, W, 3) as the camera gives it, of (H, W, 3) as it was rendered."""
+def developed(
+    rng: np.random.Generator, photo: Photo, image: UInt8Array, *, metered: UInt8Array | None = None
+) -> UInt8Array:
+    """(H, W, 3) as the camera gives it, of (H, W, 3) as it was rendered.
+
+    Args:
+        metered: (H, W, 3) as it was rendered, that auto exposure goes by; None: the image itself.
+    """
     import cv2
 
     photo = _varied(rng, photo)
-    if photo == replace(
-        PERFECT, jpeg_quality=photo.jpeg_quality, exposures=photo.exposures, exposure_s=photo.exposure_s
-    ):
+    if replace(photo, **_OF_TIME) == PERFECT:
         return image
     light: Any = _DECODE.astype(np.float32)[image]
-    light = light * np.float32(_gain(photo, light)) * _balance(photo.warmth)
+    light = light * np.float32(_gain(photo, light if metered is None else _DECODE[metered])) * _balance(photo.warmth)
     if photo.vignette > 0:
         light *= _vignette(photo.vignette, image.shape[:2])[..., None]
     if photo.defocus_px > 0:
