@@ -54,10 +54,12 @@ def ceiling(
         if as_json:
             common.emit({"machine": machine(), "rows": [asdict(one) for one in times]})
             return
+        headers = ["model", "within m", "particles", "places", "weigh ms", "ns/lookup"]
         cells = [
-            [t.model, str(t.particles), str(t.places), f"{t.weigh_ms:.3f}", f"{t.ns_per_lookup:.2f}"] for t in times
+            [t.model, f"{t.spread_m:g}", str(t.particles), str(t.places), f"{t.weigh_ms:.3f}", f"{t.ns_per_lookup:.2f}"]
+            for t in times
         ]
-        click.echo(common.table(["model", "particles", "places", "weigh ms", "ns/lookup"], cells, right=(1, 2, 3, 4)))
+        click.echo(common.table(headers, cells, right=(1, 2, 3, 4, 5)))
         return
     names = models.split(",")
     unknown = [name for name in names if name not in MODELS]
