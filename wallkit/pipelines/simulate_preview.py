@@ -18,6 +18,8 @@ from wallkit.simulate.scene import NOTHING
 from wallkit.simulate.world import MAP
 
 _GREY = (0.55, 0.55, 0.55)
+# wide enough for "dispenser" and its colour
+_LEGEND_IN = 1.25
 
 
 def preview(play: Play, time_s: float) -> bytes:
@@ -41,7 +43,7 @@ def preview(play: Play, time_s: float) -> bytes:
     figure.legend(
         handles=[_patch(names[k], _colour(k)) for k in sorted(shown)],
         loc="outside lower center",
-        ncols=9,
+        ncols=int(figure.get_figwidth() / _LEGEND_IN),
         frameon=False,
     )
     figure.suptitle(f"{play.world.name}, seed {play.seed}, at {time_s:.1f} of {play.duration_s:.1f} s", fontsize=11)
