@@ -60,7 +60,9 @@ def test_every_face_can_be_painted_at_any_size(name, size_m):
 def test_no_two_places_of_a_unique_ceiling_look_the_same():
     rng = np.random.default_rng(0)
     size = (9.6, 6.0)
-    image = ceiling_picture(rng, size, lamps_of(rng, size), px_per_m=40).pixels.astype(float).mean(axis=2)
+    lamps = lamps_of(rng, size)
+    lit = np.column_stack([lamps, np.ones(len(lamps))])
+    image = ceiling_picture(rng, size, lit, px_per_m=40).pixels.astype(float).mean(axis=2)
     patches = [image[y : y + 64, x : x + 64] for y in range(0, 170, 24) for x in range(0, 310, 24)]
     flat = np.array([(p - p.mean()).ravel() / p.std() for p in patches])
     likeness = flat @ flat.T / flat.shape[1]
