@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from tests.movers import NOISE
-from wallkit.pipelines.simulate_log import LogRequest, simulate_log
+from wallkit.pipelines.simulate.log import LogRequest, simulate_log
 from wallkit.simulate.crowd import Crowd
 from wallkit.simulate.route import Route
 from wallkit.simulate.scanner import Scanner

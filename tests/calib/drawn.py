@@ -7,10 +7,10 @@ from functools import cache
 import cv2
 import numpy as np
 
-from wallkit.calib.boards import Board
-from wallkit.calib.bundle import rotations
-from wallkit.calib.sheet import FOOT_MM, sheet_of
-from wallkit.calib.views import Capture, View
+from wallkit.calib.board.boards import Board
+from wallkit.calib.board.sheet import FOOT_MM, sheet_of
+from wallkit.calib.board.views import Capture, View
+from wallkit.calib.camera.bundle import rotations
 from wallkit.core.camera import Camera
 
 K = np.array([[600.0, 0, 321.0], [0, 602.0, 238.0], [0, 0, 1]])

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from tests.calib.drawn import BOARD, camera, picture
-from wallkit.calib.boards import Board
+from wallkit.calib.board.boards import Board
 from wallkit.core.camera import Camera
 from wallkit.core.types import CameraImage, CameraInfo
 from wallkit.logs.writer import McapWriter

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from wallkit.calib.agreement import chance_of, solved, stated
-from wallkit.calib.sightings import problem_from_sightings
-from wallkit.calib.solver import fit
-from wallkit.calib.worlds import World, draw_sightings, mounting
+from wallkit.calib.extrinsics.agreement import chance_of, solved, stated
+from wallkit.calib.extrinsics.sightings import problem_from_sightings
+from wallkit.calib.extrinsics.solver import fit
+from wallkit.calib.extrinsics.worlds import World, draw_sightings, mounting
 
 
 def drawn(seed=0):

@@ -10,8 +10,8 @@ import pytest
 from click.testing import CliRunner
 
 from tests.e2e.board_log import BOARD, middle_first, picture, pose_at, scan_of, stations
-from wallkit.calib.worlds import board_at
-from wallkit.cli.calib_extrinsics import extrinsics
+from wallkit.calib.extrinsics.worlds import board_at
+from wallkit.cli.calib.extrinsics import extrinsics
 from wallkit.errors import WallkitError
 
 ROBOT = Path(__file__).parents[2] / "calib" / "robot.urdf"
@@ -101,7 +101,7 @@ def test_a_board_that_is_cut_off(sound, tmp_path, monkeypatch):
 
 def test_corners_that_opencv_makes_up_are_no_board():
     """A board whose right third is hidden: the search of OpenCV puts the last columns on the bare wall."""
-    from wallkit.calib.detect import find_corners, find_quickly
+    from wallkit.calib.board.detect import find_corners, find_quickly
 
     rng = np.random.default_rng(0)
     whole = picture(pose_at(stations(3), 0.0), rng)

@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 import pytest
 
-from wallkit.calib import detect
-from wallkit.calib.boards import Board, board_from, opencv_board
-from wallkit.calib.bundle import homography
-from wallkit.calib.detect import find_corners, find_roughly
-from wallkit.calib.sheet import PAPERS, Sheet, pdf_from_sheet, sheet_of, svg_from_sheet
+from wallkit.calib.board import detect
+from wallkit.calib.board.boards import Board, board_from, opencv_board
+from wallkit.calib.board.detect import find_corners, find_roughly
+from wallkit.calib.board.sheet import PAPERS, Sheet, pdf_from_sheet, sheet_of, svg_from_sheet
+from wallkit.calib.camera.bundle import homography
 from wallkit.errors import CalibrationError
 
 BOARDS = [

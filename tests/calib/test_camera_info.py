@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wallkit.calib.boards import Board
+from wallkit.calib.board.boards import Board
 from wallkit.core.camera import Camera
 from wallkit.core.types import CameraImage, CameraInfo
 from wallkit.logs.writer import McapWriter
-from wallkit.pipelines.calib_captures import CaptureRequest
-from wallkit.pipelines.calib_intrinsics_info import published_against
+from wallkit.pipelines.calib.captures import CaptureRequest
+from wallkit.pipelines.calib.intrinsics_info import published_against
 
 K = np.array([[520.0, 0, 320], [0, 520, 240], [0, 0, 1]])
 CAMERA = Camera("plumb_bob", 640, 480, K, np.zeros(5))

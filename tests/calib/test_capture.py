@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from tests.calib.drawn import BOARD, board_poses, camera, picture
-from wallkit.calib.boards import board_from
-from wallkit.calib.capture import capture_from_pictures, pictures_of_files
-from wallkit.calib.detect import find_roughly
-from wallkit.calib.frames import Picture
-from wallkit.calib.pattern import find_pattern
-from wallkit.calib.views import capture_from_npz
+from wallkit.calib.board.boards import board_from
+from wallkit.calib.board.capture import capture_from_pictures, pictures_of_files
+from wallkit.calib.board.detect import find_roughly
+from wallkit.calib.board.frames import Picture
+from wallkit.calib.board.pattern import find_pattern
+from wallkit.calib.board.views import capture_from_npz
 from wallkit.errors import CalibrationError
 
 pytestmark = pytest.mark.opencv

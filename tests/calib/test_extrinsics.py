@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wallkit.calib.advice import next_pose
-from wallkit.calib.audits import range_bias, square_size
-from wallkit.calib.extrinsics import Hold, evaluate, plane_rms_mm, sigma_words, solve, subset
-from wallkit.calib.pixel_error import pixel_error_95
-from wallkit.calib.planar import planar_answer
-from wallkit.calib.rigid import angle_between, rotation_from_vector
-from wallkit.calib.sightings import problem_from_sightings
-from wallkit.calib.solver import fit
-from wallkit.calib.worlds import UPRIGHT, World, board_at, draw_sightings, mounting, sighting_of
+from wallkit.calib.extrinsics.advice import next_pose
+from wallkit.calib.extrinsics.audits import range_bias, square_size
+from wallkit.calib.extrinsics.extrinsics import Hold, evaluate, plane_rms_mm, sigma_words, solve, subset
+from wallkit.calib.extrinsics.pixel_error import pixel_error_95
+from wallkit.calib.extrinsics.planar import planar_answer
+from wallkit.calib.extrinsics.rigid import angle_between, rotation_from_vector
+from wallkit.calib.extrinsics.sightings import problem_from_sightings
+from wallkit.calib.extrinsics.solver import fit
+from wallkit.calib.extrinsics.worlds import UPRIGHT, World, board_at, draw_sightings, mounting, sighting_of
 from wallkit.core.camera import Camera
 from wallkit.errors import CalibrationError
 
@@ -87,7 +87,7 @@ def test_two_orientations_leave_the_shift_along_their_intersection_open():
 
 def solve_reason_of_shift(result):
     """A single open shift is explained by the normals unless it is the height of a level LiDAR."""
-    from wallkit.calib.observability import _reason
+    from wallkit.calib.extrinsics.observability import _reason
 
     return _reason(result.observability.directions, ("shift along (+0.00 +0.00 +1.00) of the LiDAR",))
 

@@ -10,22 +10,22 @@ import numpy as np
 import pytest
 
 from tests.calib.drawn import BOARD, DISTORTIONS, board_poses, camera, capture_of, sweep_poses
-from wallkit.calib.boards import Board, board_from
-from wallkit.calib.bundle import Fit, adjust, first_fit, jacobians, moved, normal_equations
-from wallkit.calib.camera_covariance import camera_spread, naive_covariance
-from wallkit.calib.camera_coverage import coverage_of
-from wallkit.calib.camera_gates import camera_gates
-from wallkit.calib.capture import capture_from_pictures, pictures_of_files
-from wallkit.calib.covariance import spread_of
-from wallkit.calib.cross_validation import candidates, choose, compare_halves, held_out_errors
-from wallkit.calib.gates import verdict_of
-from wallkit.calib.intrinsics import MODELS, calibrate, fit_cameras, free_parameters, robust_sigma
-from wallkit.calib.projection_uncertainty import projection_difference, projection_sigma
-from wallkit.calib.select import most_informative
-from wallkit.calib.views import Capture, View, capture_from_npz, observations_of
+from wallkit.calib.board.boards import Board, board_from
+from wallkit.calib.board.capture import capture_from_pictures, pictures_of_files
+from wallkit.calib.board.views import Capture, View, capture_from_npz, observations_of
+from wallkit.calib.camera.bundle import Fit, adjust, first_fit, jacobians, moved, normal_equations
+from wallkit.calib.camera.covariance import camera_spread, naive_covariance
+from wallkit.calib.camera.coverage import coverage_of
+from wallkit.calib.camera.cross_validation import candidates, choose, compare_halves, held_out_errors
+from wallkit.calib.camera.gates import camera_gates
+from wallkit.calib.camera.intrinsics import MODELS, calibrate, fit_cameras, free_parameters, robust_sigma
+from wallkit.calib.camera.projection_uncertainty import projection_difference, projection_sigma
+from wallkit.calib.camera.select import most_informative
+from wallkit.calib.extrinsics.covariance import spread_of
+from wallkit.calib.verify.gates import verdict_of
 from wallkit.core.camera import Camera
 from wallkit.errors import CalibrationError
-from wallkit.pipelines.calib_intrinsics import reprojection_errors
+from wallkit.pipelines.calib.intrinsics import reprojection_errors
 
 LENSES = tuple(DISTORTIONS)
 

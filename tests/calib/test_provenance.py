@@ -10,8 +10,8 @@ import numpy as np
 from click.testing import CliRunner
 
 from tests.calib.drawn import board_poses, picture
-from wallkit.calib.store import read_calibration
-from wallkit.cli.calib_intrinsics import intrinsics
+from wallkit.calib.files.store import read_calibration
+from wallkit.cli.calib.intrinsics import intrinsics
 from wallkit.pipelines.provenance import digests, portable
 
 WORDS = ("--board", "chessboard:9x6:0.03", "--model", "k1k2", "-q")

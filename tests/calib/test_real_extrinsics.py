@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from wallkit.calib.boards import Board
-from wallkit.calib.extrinsics import solve
-from wallkit.calib.rigid import angle_between, rotation_from_vector, rpy_from_matrix
-from wallkit.calib.sightings import plane_sighting, problem_from_sightings
-from wallkit.calib.solver import fit
-from wallkit.cli.calib_extrinsics import extrinsics
+from wallkit.calib.board.boards import Board
+from wallkit.calib.extrinsics.extrinsics import solve
+from wallkit.calib.extrinsics.rigid import angle_between, rotation_from_vector, rpy_from_matrix
+from wallkit.calib.extrinsics.sightings import plane_sighting, problem_from_sightings
+from wallkit.calib.extrinsics.solver import fit
+from wallkit.cli.calib.extrinsics import extrinsics
 from wallkit.core.camera import Camera
-from wallkit.pipelines.calibrate_extrinsics import SolveOptions, run_extrinsics
-from wallkit.pipelines.calibrate_files import gather_files
+from wallkit.pipelines.calib.extrinsics import SolveOptions, run_extrinsics
+from wallkit.pipelines.calib.files import gather_files
 
 pytestmark = pytest.mark.data
 ACFR = Board("chessboard", 7, 5, 0.095, plate_m=(0.85, 0.61), plate_offset_m=(0.0, 0.002))
@@ -40,7 +40,7 @@ D_2D = np.array([0.11418155, 0.19343114, -0.00268067, 0.00371577, -1.09539701])
 
 @pytest.fixture(scope="module")
 def camera_2d(tmp_path_factory):
-    from wallkit.calib.store import toml_from_calibration
+    from wallkit.calib.files.store import toml_from_calibration
     from wallkit.core.calibration import Calibration
 
     path = tmp_path_factory.mktemp("cameras") / "tb3.toml"
@@ -159,7 +159,7 @@ def test_turtlebot_the_reference_is_least_squares_over_whole_runs(data, camera_2
     weight for each. We leave out what stands off its line by 3 sigma and give each view the weight of a line: 3.7 mm."""
     from scipy.optimize import least_squares
 
-    from wallkit.calib.worlds import UPRIGHT
+    from wallkit.calib.extrinsics.worlds import UPRIGHT
 
     here = data / "calib" / "acfr_2d"
     gathered = gather_files([here / "images"], here / "lasers", Board("chessboard", 11, 8, 0.019), camera_2d)
@@ -218,8 +218,8 @@ def test_same_bytes_twice(data, tmp_path):
 
 def test_whole_rooms_are_searched_without_a_guess(data):
     """The full clouds: the plate is found among everything else, where the cut-out clouds have it."""
-    from wallkit.calib.cloud_board import find_patch
-    from wallkit.calib.scan_files import read_scan
+    from wallkit.calib.extrinsics.cloud_board import find_patch
+    from wallkit.calib.extrinsics.scan_files import read_scan
 
     here = data / "calib" / "acfr_vlp16"
     for pose in (1, 11, 40):

@@ -12,16 +12,16 @@ import pytest
 from click.testing import CliRunner
 
 from tests.calib.test_real_extrinsics import ACFR, OPTIONS, acfr, camera_2d
-from wallkit.calib.evidence import evidence_of, with_sightings
-from wallkit.calib.extrinsics import Hold, solve
-from wallkit.calib.observability import DEGREES_OF_FREEDOM
-from wallkit.calib.planar import planar_placement
-from wallkit.calib.sightings import plane_sighting, problem_from_sightings
-from wallkit.calib.store import read_calibration, toml_from_calibration
-from wallkit.calib.target_free import moved
-from wallkit.calib.verify import GATES, verify
-from wallkit.calib.verify_limits import VerifyLimits
-from wallkit.cli.calib_verify import verify as verify_command
+from wallkit.calib.extrinsics.extrinsics import Hold, solve
+from wallkit.calib.extrinsics.observability import DEGREES_OF_FREEDOM
+from wallkit.calib.extrinsics.planar import planar_placement
+from wallkit.calib.extrinsics.sightings import plane_sighting, problem_from_sightings
+from wallkit.calib.files.store import read_calibration, toml_from_calibration
+from wallkit.calib.verify.evidence import evidence_of, with_sightings
+from wallkit.calib.verify.free import moved
+from wallkit.calib.verify.limits import VerifyLimits
+from wallkit.calib.verify.verify import GATES, verify
+from wallkit.cli.calib.verify import verify as verify_command
 from wallkit.core.calibration import Calibration, Provenance
 
 __all__ = ["camera_2d"]
@@ -129,9 +129,9 @@ def test_record_one_of_poses_csv_is_an_outlier_by_name(data):
 
 def turtlebot(data, camera: Path, square: str, tmp_path):
     """acfr_2d with the planar answer as its calibration: six numbers of which three are assumed."""
-    from wallkit.calib.boards import board_from
-    from wallkit.pipelines.calibrate_extrinsics import SolveOptions, run_extrinsics
-    from wallkit.pipelines.calibrate_files import gather_files
+    from wallkit.calib.board.boards import board_from
+    from wallkit.pipelines.calib.extrinsics import SolveOptions, run_extrinsics
+    from wallkit.pipelines.calib.files import gather_files
 
     here = data / "calib" / "acfr_2d"
     gathered = gather_files([here / "images"], here / "lasers", board_from(f"chessboard:11x8:{square}"), camera)
@@ -162,9 +162,9 @@ def test_turtlebot_with_20_mm_squares_is_flagged(data, camera_2d, tmp_path):
 
 
 def test_four_charuco_views_never_pass(data, tmp_path):
-    from wallkit.calib.boards import board_from
-    from wallkit.pipelines.calib_captures import CaptureRequest
-    from wallkit.pipelines.calib_intrinsics import calibrate_camera
+    from wallkit.calib.board.boards import board_from
+    from wallkit.pipelines.calib.captures import CaptureRequest
+    from wallkit.pipelines.calib.intrinsics import calibrate_camera
 
     here, words = data / "calib" / "opencv_charuco", "charuco:5x7:0.04:0.02:DICT_6X6_250"
     found = calibrate_camera(CaptureRequest((here,), board_from(words)), model="plumb_bob")

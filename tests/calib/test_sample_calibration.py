@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from wallkit.calib.agreement import chance_of, stated
-from wallkit.calib.evidence import lidar_axes
-from wallkit.calib.from_urdf import transform_from_urdf
-from wallkit.calib.solver import difference
-from wallkit.calib.store import read_calibration
+from wallkit.calib.extrinsics.agreement import chance_of, stated
+from wallkit.calib.extrinsics.solver import difference
+from wallkit.calib.files.from_urdf import transform_from_urdf
+from wallkit.calib.files.store import read_calibration
+from wallkit.calib.verify.evidence import lidar_axes
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "calib"

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wallkit.calib.cloud_board import find_patch, side_faces
-from wallkit.calib.rigid import rotation_from_vector
-from wallkit.calib.scan_board import find_trace, returns_of, returns_of_points, traces_without_guess
-from wallkit.calib.sightings import BoardPose
-from wallkit.calib.worlds import UPRIGHT, World, board_at, hits
+from wallkit.calib.extrinsics.cloud_board import find_patch, side_faces
+from wallkit.calib.extrinsics.rigid import rotation_from_vector
+from wallkit.calib.extrinsics.scan_board import find_trace, returns_of, returns_of_points, traces_without_guess
+from wallkit.calib.extrinsics.sightings import BoardPose
+from wallkit.calib.extrinsics.worlds import UPRIGHT, World, board_at, hits
 from wallkit.core.types import Scan
 
 PLATE = np.array([(-0.4, -0.3, 0), (0.4, -0.3, 0), (0.4, 0.3, 0), (-0.4, 0.3, 0)])

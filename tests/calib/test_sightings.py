@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wallkit.calib.rigid import rotation_from_vector
-from wallkit.calib.sightings import (
+from wallkit.calib.extrinsics.rigid import rotation_from_vector
+from wallkit.calib.extrinsics.sightings import (
     BoardPose,
     jacobian,
     plane_distances,
@@ -15,7 +15,7 @@ from wallkit.calib.sightings import (
     residuals,
     whiteners,
 )
-from wallkit.calib.worlds import World, draw_sightings, mounting
+from wallkit.calib.extrinsics.worlds import World, draw_sightings, mounting
 
 
 def scene(*, planar=True, seed=0, count=6):

@@ -5,13 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wallkit.calib.covariance import quantiles, spread_of
-from wallkit.calib.coverage import coverage
-from wallkit.calib.rigid import angle_between, left_jacobian, matrix_from_rpy, rotation_from_vector, rpy_from_matrix
-from wallkit.calib.sightings import problem_from_sightings
-from wallkit.calib.solver import basis_at, difference, fit, prior_along
-from wallkit.calib.starts import first_guesses
-from wallkit.calib.worlds import World, draw_sightings, mounting
+from wallkit.calib.extrinsics.covariance import quantiles, spread_of
+from wallkit.calib.extrinsics.coverage import coverage
+from wallkit.calib.extrinsics.rigid import (
+    angle_between,
+    left_jacobian,
+    matrix_from_rpy,
+    rotation_from_vector,
+    rpy_from_matrix,
+)
+from wallkit.calib.extrinsics.sightings import problem_from_sightings
+from wallkit.calib.extrinsics.solver import basis_at, difference, fit, prior_along
+from wallkit.calib.extrinsics.starts import first_guesses
+from wallkit.calib.extrinsics.worlds import World, draw_sightings, mounting
 
 
 @pytest.mark.parametrize("planar", [True, False])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wallkit.calib.store import FORMATS, read_calibration, text_from_calibration
+from wallkit.calib.files.store import FORMATS, read_calibration, text_from_calibration
 from wallkit.core.calibration import Calibration, Provenance
 from wallkit.core.camera import Camera
 from wallkit.errors import CalibrationError

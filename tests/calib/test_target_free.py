@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
-from wallkit.calib.target_free import lowest, moved, profile_gate, profiles
-from wallkit.calib.target_free_lines import edges_of_scan, floor_offsets, lines_gate, vertical_offsets
-from wallkit.calib.target_free_nid import nid_frame, nid_scores
-from wallkit.calib.worlds import UPRIGHT
+from wallkit.calib.extrinsics.worlds import UPRIGHT
+from wallkit.calib.verify.free import lowest, moved, profile_gate, profiles
+from wallkit.calib.verify.free_lines import edges_of_scan, floor_offsets, lines_gate, vertical_offsets
+from wallkit.calib.verify.free_nid import nid_frame, nid_scores
 from wallkit.core.camera import Camera
 
 K = np.array([[400.0, 0, 320], [0, 400, 240], [0, 0, 1]])

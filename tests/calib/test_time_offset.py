@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wallkit.calib.coarse_offset import coarse_offset, traces_at
-from wallkit.calib.time_offset import BoardTrack, TimedTrace, poses_at, time_offset
-from wallkit.calib.worlds import UPRIGHT, World, board_at, hits
+from wallkit.calib.extrinsics.coarse_offset import coarse_offset, traces_at
+from wallkit.calib.extrinsics.time_offset import BoardTrack, TimedTrace, poses_at, time_offset
+from wallkit.calib.extrinsics.worlds import UPRIGHT, World, board_at, hits
 from wallkit.core.types import PointCloud, Scan
 
 PLATE = np.array([[-0.4, -0.3, 0], [0.4, -0.3, 0], [0.4, 0.3, 0], [-0.4, 0.3, 0]])

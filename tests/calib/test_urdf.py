@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wallkit.calib.from_urdf import place_words, transform_from_urdf
-from wallkit.calib.rigid import matrix_from_rpy
-from wallkit.calib.urdf_origin import joints_of, with_calibration
+from wallkit.calib.extrinsics.rigid import matrix_from_rpy
+from wallkit.calib.files.from_urdf import place_words, transform_from_urdf
+from wallkit.calib.files.urdf_origin import joints_of, with_calibration
 from wallkit.errors import CalibrationError
 
 ROBOT = """<?xml version="1.0"?>

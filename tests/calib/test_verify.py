@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wallkit.calib.audits import Audit
-from wallkit.calib.edges import EdgeFit, edge_fit
-from wallkit.calib.evidence import Evidence, evidence_of, with_sightings
-from wallkit.calib.extrinsics import Hold, ViewFit, solve
-from wallkit.calib.gates import Gate
-from wallkit.calib.observability import DEGREES_OF_FREEDOM
-from wallkit.calib.sanity import faults_of_info
-from wallkit.calib.sightings import BoardPose
-from wallkit.calib.target_free import moved
-from wallkit.calib.verify import GATES, Judgement, verify
-from wallkit.calib.verify_limits import VerifyLimits
-from wallkit.calib.worlds import UPRIGHT, World, board_at, draw_sightings, mounting, sighting_of
+from wallkit.calib.camera.sanity import faults_of_info
+from wallkit.calib.extrinsics.audits import Audit
+from wallkit.calib.extrinsics.edges import EdgeFit, edge_fit
+from wallkit.calib.extrinsics.extrinsics import Hold, ViewFit, solve
+from wallkit.calib.extrinsics.observability import DEGREES_OF_FREEDOM
+from wallkit.calib.extrinsics.sightings import BoardPose
+from wallkit.calib.extrinsics.worlds import UPRIGHT, World, board_at, draw_sightings, mounting, sighting_of
+from wallkit.calib.verify.evidence import Evidence, evidence_of, with_sightings
+from wallkit.calib.verify.free import moved
+from wallkit.calib.verify.gates import Gate
+from wallkit.calib.verify.limits import VerifyLimits
+from wallkit.calib.verify.verify import GATES, Judgement, verify
 from wallkit.core.calibration import Calibration
 from wallkit.core.camera import Camera
 from wallkit.core.types import CameraInfo

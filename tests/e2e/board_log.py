@@ -5,8 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from wallkit.calib.boards import Board
-from wallkit.calib.worlds import UPRIGHT, board_at
+from wallkit.calib.board.boards import Board
+from wallkit.calib.extrinsics.worlds import UPRIGHT, board_at
 from wallkit.core.types import CameraImage, CameraInfo, Scan
 from wallkit.logs.writer import McapWriter
 

@@ -11,7 +11,7 @@ import numpy as np
 from tests.localize.worlds import FLAT, INSIDE
 from tests.movers import tour
 from tests.plan import cast, occupancy
-from wallkit.calib.store import toml_from_calibration
+from wallkit.calib.files.store import toml_from_calibration
 from wallkit.core.calibration import Calibration, Provenance
 from wallkit.core.camera import Camera
 from wallkit.core.geometry import interpolate_poses

@@ -8,8 +8,8 @@ import pytest
 
 from tests.calib.drawn import board_poses, camera, capture_of, picture, sweep_poses
 from tests.calib.film import write_film
-from wallkit.calib.boards import board_from
-from wallkit.calib.store import read_calibration
+from wallkit.calib.board.boards import board_from
+from wallkit.calib.files.store import read_calibration
 
 WORDS = "chessboard:9x6:0.03"
 CAMERA_INFO = """image_width: 640

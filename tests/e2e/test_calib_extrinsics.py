@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from tests.e2e.board_log import BOARD, TAU_S, T, middle_first, picture
-from wallkit.calib.rigid import angle_between
-from wallkit.calib.store import read_calibration
-from wallkit.calib.worlds import board_at
+from wallkit.calib.extrinsics.rigid import angle_between
+from wallkit.calib.extrinsics.worlds import board_at
+from wallkit.calib.files.store import read_calibration
 
 
 def test_a_log_is_calibrated(wallkit, board_log, tmp_path):

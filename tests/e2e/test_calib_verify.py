@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tests.e2e.board_log import BOARD, TAU_S, K, T
-from wallkit.calib.store import read_calibration, toml_from_calibration
-from wallkit.calib.target_free import moved
+from wallkit.calib.files.store import read_calibration, toml_from_calibration
+from wallkit.calib.verify.free import moved
 from wallkit.core.calibration import Calibration
 from wallkit.core.camera import Camera
 

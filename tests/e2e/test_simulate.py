@@ -13,7 +13,7 @@ from wallkit.core.types import Odometry, PointCloud, Scan, StampedPose
 from wallkit.evaluate.tum import read_tum
 from wallkit.logs.reader import open_log
 from wallkit.maps.read import load_map
-from wallkit.pipelines.simulate_world import world_from_map
+from wallkit.pipelines.simulate.world import world_from_map
 
 STORY = """
 title = "a short one"

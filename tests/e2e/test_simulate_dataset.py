@@ -15,7 +15,7 @@ from wallkit.dataset.polygons import mask_from_polygons, polygons_from_yolo
 from wallkit.dataset.rle import counts_from_text, mask_from_counts
 from wallkit.maps.draft.write import write_draft
 from wallkit.maps.rules import validate
-from wallkit.pipelines.simulate_buildings import random_building
+from wallkit.pipelines.simulate.buildings import random_building
 
 __all__ = ["gl"]
 WORDS = ["--images", "6", "--per-scene", "3", "--size", "160x120", "--seed", "4", "--val", "0.5", "-q"]
@@ -119,7 +119,7 @@ def test_an_interrupted_run_goes_on_where_it_stopped(made, tmp_path, wallkit, mo
 
     What it was to replace stays until the end.
     """
-    from wallkit.pipelines import simulate_dataset as pipeline
+    from wallkit.pipelines.simulate import dataset as pipeline
 
     out, _ = made
     request = pipeline.DatasetRequest(6, 4, (), (160, 120), 3, 0.5)

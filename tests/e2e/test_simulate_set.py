@@ -12,8 +12,8 @@ import pytest
 from tests.maps.random_maps import clean_map
 from wallkit.maps.read import load_map
 from wallkit.maps.rules import validate
-from wallkit.pipelines.simulate_log import prepare
-from wallkit.pipelines.simulate_set import SetRequest, requests_of
+from wallkit.pipelines.simulate.log import prepare
+from wallkit.pipelines.simulate.set import SetRequest, requests_of
 
 EVALUATION = Path(__file__).parents[2] / "evaluation"
 SET = """

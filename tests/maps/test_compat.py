@@ -14,8 +14,8 @@ from wallkit.maps.document import apply_edits
 from wallkit.maps.findings.compat import views_of
 from wallkit.maps.rules import validate
 from wallkit.maps.rules.tolerances import Tolerances
-from wallkit.pipelines.map import Selection
-from wallkit.pipelines.map_compat import compat_of
+from wallkit.pipelines.map.compat import compat_of
+from wallkit.pipelines.map.verdicts import Selection
 
 FOLDER = Path(os.environ.get("WALLKIT_TEST_DATA", "")) / "maps/malformed"
 MANIFEST = FOLDER / "manifest.json"

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from tests.maps.drawn import HEAD, box, placed, robot
 from wallkit.cli import common
-from wallkit.cli.map import validate as validate_command
+from wallkit.cli.map.group import validate as validate_command
 from wallkit.maps.document import Document, Edit, apply_edits
 from wallkit.maps.findings.formats import DOCUMENTS, TEXTS, github_from, json_from, junit_from
 from wallkit.maps.findings.judged import Judged

@@ -19,7 +19,7 @@ from wallkit.maps.score.score import score
 from wallkit.maps.score.world import ScoreSettings, World
 from wallkit.maps.sight import cast_beams, index_segments
 from wallkit.maps.xml import parse
-from wallkit.pipelines.map_score import probe_map
+from wallkit.pipelines.map.score import probe_map
 
 HEADER = '<wk:map format="1.0" units="m rad" level="1" scan_plane="0.3"/>'
 FEW = ScoreSettings(poses=60)

@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 
 import wallkit as package
-from wallkit.calib.store import toml_from_calibration
+from wallkit.calib.files.store import toml_from_calibration
 from wallkit.core.calibration import Calibration
 from wallkit.core.camera import Camera
 from wallkit.errors import ModelError
-from wallkit.pipelines.model_export import ExportRequest, export_model, size_for_camera
+from wallkit.pipelines.model.export import ExportRequest, export_model, size_for_camera
 from wallkit.segment.child import find_interpreter
 from wallkit.segment.settings import SegmentSettings
 

@@ -7,8 +7,8 @@ import pytest
 
 from tests.segment.drawn import colour_oracle, picture
 from wallkit.errors import ModelError
-from wallkit.pipelines.model_pictures import Picture, PictureSource, pictures_of
-from wallkit.pipelines.model_quantize import quantise_model
+from wallkit.pipelines.model.pictures import Picture, PictureSource, pictures_of
+from wallkit.pipelines.model.quantize import quantise_model
 from wallkit.segment.fixture import USUAL, oracle
 from wallkit.segment.onnx_graph import read_graph
 from wallkit.segment.onnx_segmenter import load_segmenter

@@ -12,8 +12,8 @@ import wallkit as package
 from tests.segment.altered import WANTS, altered_oracle
 from tests.segment.drawn import picture
 from wallkit.errors import ModelError
-from wallkit.pipelines.model_pictures import PictureSource, pictures_of
-from wallkit.pipelines.model_verify import VerifyRequest, verify_models
+from wallkit.pipelines.model.pictures import PictureSource, pictures_of
+from wallkit.pipelines.model.verify import VerifyRequest, verify_models
 from wallkit.segment.fixture import USUAL, oracle
 from wallkit.segment.other_ways import PREPARATIONS
 from wallkit.segment.settings import SegmentSettings

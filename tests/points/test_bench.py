@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from wallkit.pipelines import bench_points
+from wallkit.pipelines.bench import points as bench_points
 
 
 @pytest.fixture(autouse=True)

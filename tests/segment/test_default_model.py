@@ -48,8 +48,8 @@ def test_walls_of_a_building_that_nobody_has_seen_are_found(tmp_path):
     """Drawn and rendered here, by a seed of its own."""
     pytest.importorskip("mujoco")
     from wallkit.errors import SimulationError
-    from wallkit.pipelines.model_evaluate import evaluate_model
-    from wallkit.pipelines.simulate_dataset import DatasetRequest, simulate_dataset
+    from wallkit.pipelines.model.evaluate import evaluate_model
+    from wallkit.pipelines.simulate.dataset import DatasetRequest, simulate_dataset
     from wallkit.simulate.gl import backend
 
     try:

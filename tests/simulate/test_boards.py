@@ -8,14 +8,14 @@ import cv2
 import numpy as np
 import pytest
 
-from wallkit.calib.board_pose import pose_of_board
-from wallkit.calib.boards import board_from, opencv_board
-from wallkit.calib.detect import find_corners
-from wallkit.calib.scan_files import read_scan
+from wallkit.calib.board.boards import board_from, opencv_board
+from wallkit.calib.board.detect import find_corners
+from wallkit.calib.board.pose import pose_of_board
+from wallkit.calib.extrinsics.scan_files import read_scan
 from wallkit.errors import SimulationError
-from wallkit.pipelines.bench_boards import recoveries
-from wallkit.pipelines.simulate_boards import BoardRequest, board_picture, captures, pcd_from_cloud
-from wallkit.pipelines.simulate_units import unit_of
+from wallkit.pipelines.bench.boards import recoveries
+from wallkit.pipelines.simulate.boards import BoardRequest, board_picture, captures, pcd_from_cloud
+from wallkit.pipelines.simulate.units import unit_of
 from wallkit.simulate.board_room import BOARD as BOARD_BODY
 from wallkit.simulate.board_room import STAND, BoardPoses, board_room
 from wallkit.simulate.photo import PERFECT

@@ -13,10 +13,10 @@ from tests.maps.random_maps import clean_map
 from wallkit.core.camera import camera_from_info
 from wallkit.errors import SimulationError
 from wallkit.logs.reader import open_log
-from wallkit.pipelines.simulate_camera import NO_CLASS, render
-from wallkit.pipelines.simulate_log import LogRequest, prepare, simulate_log
-from wallkit.pipelines.simulate_play import START_NS
-from wallkit.pipelines.simulate_preview import preview
+from wallkit.pipelines.simulate.camera import NO_CLASS, render
+from wallkit.pipelines.simulate.log import LogRequest, prepare, simulate_log
+from wallkit.pipelines.simulate.play import START_NS
+from wallkit.pipelines.simulate.preview import preview
 from wallkit.simulate.crowd import Crowd
 from wallkit.simulate.scenario import CameraSetup, Scenario
 

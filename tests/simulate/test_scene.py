@@ -13,7 +13,7 @@ from tests.simulate.drawn import door, room, standing
 from wallkit.errors import MapError, SimulationError
 from wallkit.maps.geometry import slice_at
 from wallkit.maps.read import load_map
-from wallkit.pipelines.simulate_world import world_from_map
+from wallkit.pipelines.simulate.world import world_from_map
 from wallkit.simulate.scene import NOTHING, Scene
 from wallkit.simulate.world import Body, Solid, World, upright
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from tests.maps.random_maps import clean_map
-from wallkit.pipelines.simulate_camera import render
-from wallkit.pipelines.simulate_log import LogRequest, prepare
-from wallkit.pipelines.simulate_play import START_NS
+from wallkit.pipelines.simulate.camera import render
+from wallkit.pipelines.simulate.log import LogRequest, prepare
+from wallkit.pipelines.simulate.play import START_NS
 from wallkit.simulate.crowd import Crowd
 from wallkit.simulate.photo import PERFECT, developed
 from wallkit.simulate.scenario import CameraSetup, Scenario

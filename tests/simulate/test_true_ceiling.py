@@ -11,10 +11,10 @@ import pytest
 
 from wallkit.core.ceiling import colours_at
 from wallkit.core.ceiling_eye import CeilingEye, smoothed
-from wallkit.pipelines.simulate_camera import render
-from wallkit.pipelines.simulate_ceiling import true_ceiling
-from wallkit.pipelines.simulate_log import LogRequest, prepare
-from wallkit.pipelines.simulate_play import START_NS
+from wallkit.pipelines.simulate.camera import render
+from wallkit.pipelines.simulate.ceiling import true_ceiling
+from wallkit.pipelines.simulate.log import LogRequest, prepare
+from wallkit.pipelines.simulate.play import START_NS
 from wallkit.simulate.scenario import read_scenario
 
 MAP = Path(__file__).parents[2] / "maps" / "restroom.wkmap.urdf"

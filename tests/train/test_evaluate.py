@@ -9,7 +9,7 @@ import pytest
 
 from tests.train.flat import NAMES, flat_set
 from wallkit.errors import ModelError
-from wallkit.pipelines.model_evaluate import NOTHING, evaluate_model, minimum_of
+from wallkit.pipelines.model.evaluate import NOTHING, evaluate_model, minimum_of
 from wallkit.segment.fixture import USUAL, oracle
 
 

@@ -11,8 +11,8 @@ import pytest
 
 from tests.train.flat import NAMES, flat, flat_set
 from wallkit.errors import DatasetError, ModelError
-from wallkit.pipelines import model_train
-from wallkit.pipelines.model_train import TrainRequest, check_request, train_model
+from wallkit.pipelines.model import train as model_train
+from wallkit.pipelines.model.train import TrainRequest, check_request, train_model
 
 SIZE = (64, 48)
 

@@ -10,7 +10,7 @@ import pytest
 
 from tests.train.flat import flat_set
 from wallkit.errors import ModelError
-from wallkit.pipelines.model_train_yolo import YoloRequest, check_yolo, train_yolo_model
+from wallkit.pipelines.model.train_yolo import YoloRequest, check_yolo, train_yolo_model
 from wallkit.train.yolo import YoloLesson, command, epochs_of, train_yolo
 
 RESULTS = """epoch,time,train/box_loss,train/seg_loss,metrics/mAP50(M),metrics/mAP50-95(M),val/box_loss,val/seg_loss,lr/pg0

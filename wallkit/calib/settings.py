@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from wallkit.calib.camera_limits import CameraLimits
-from wallkit.calib.verify_limits import VerifyLimits
+from wallkit.calib.camera.limits import CameraLimits
+from wallkit.calib.verify.limits import VerifyLimits
 from wallkit.core.config import section
 
 

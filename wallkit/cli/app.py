@@ -5,8 +5,8 @@ from __future__ import annotations
 import click
 
 import wallkit
-from wallkit.cli.bench import bench
-from wallkit.cli.calib import calib
+from wallkit.cli.bench.group import bench
+from wallkit.cli.calib.group import calib
 from wallkit.cli.ceiling import ceiling
 from wallkit.cli.common import CONTEXT, WallkitGroup
 from wallkit.cli.config import completion, config
@@ -16,9 +16,9 @@ from wallkit.cli.doctor import doctor
 from wallkit.cli.evaluate import compare, evaluate, report
 from wallkit.cli.localize import localize
 from wallkit.cli.log import log
-from wallkit.cli.map import map_group
-from wallkit.cli.model import model
-from wallkit.cli.simulate import simulate
+from wallkit.cli.map.group import map_group
+from wallkit.cli.model.group import model
+from wallkit.cli.simulate.group import simulate
 
 
 @click.group(cls=WallkitGroup, context_settings=CONTEXT)

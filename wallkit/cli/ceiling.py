@@ -14,8 +14,8 @@ from wallkit.cli.up_camera import camera_from_flags, up_camera_options
 
 if TYPE_CHECKING:
     from wallkit.core.ceiling import CeilingMap
-    from wallkit.pipelines.ceiling_build import Built
-    from wallkit.pipelines.ceiling_fit import Fitted
+    from wallkit.pipelines.ceiling.build import Built
+    from wallkit.pipelines.ceiling.fit import Fitted
 
 _robot_options = common.options(
     click.option("--odom", metavar="TOPIC", help='Odometry topic or transform "odom->base_link".'),
@@ -63,7 +63,7 @@ def fit(
       wallkit ceiling fit log.mcap --picture photo.jpg --poses log.wallkit -o ceiling.yaml
       wallkit ceiling fit log.mcap --picture plan.png --matches clicked.csv --json
     """
-    from wallkit.pipelines.ceiling_fit import FitRequest, fit_ceiling
+    from wallkit.pipelines.ceiling.fit import FitRequest, fit_ceiling
     from wallkit.pipelines.config import load_config
 
     config = load_config(flags["config_path"], flags["words"]).config
@@ -108,7 +108,7 @@ def build(logs: tuple[Path, ...], as_json: bool, **flags: Any) -> None:
       wallkit ceiling build log.mcap -o ceiling.yaml
       wallkit ceiling build log.mcap --poses log.wallkit --height 2.7 -o ceiling.yaml
     """
-    from wallkit.pipelines.ceiling_build import BuildRequest, build_ceiling
+    from wallkit.pipelines.ceiling.build import BuildRequest, build_ceiling
     from wallkit.pipelines.config import load_config
 
     for name, least in (("resolution", 0.002), ("every", 0.0)):

@@ -70,7 +70,7 @@ def from_log(
     from dataclasses import asdict
 
     from wallkit.dataset.classes import read_label_set
-    from wallkit.pipelines.dataset_from_log import FromLogs, dataset_from_logs
+    from wallkit.pipelines.dataset.from_log import FromLogs, dataset_from_logs
 
     labels = read_label_set(classes)
     out = out or Path("dataset")

@@ -9,7 +9,7 @@ import click
 from wallkit.cli import common
 
 if TYPE_CHECKING:
-    from wallkit.pipelines.ceiling_camera import CameraWords
+    from wallkit.pipelines.ceiling.camera import CameraWords
 
 up_camera_options = common.options(
     click.option("--image", metavar="TOPIC", help="Camera that looks at the ceiling, when several do."),
@@ -19,6 +19,6 @@ up_camera_options = common.options(
 
 def camera_from_flags(flags: dict[str, Any]) -> CameraWords:
     """What the user said of the camera that looks up."""
-    from wallkit.pipelines.ceiling_camera import CameraWords
+    from wallkit.pipelines.ceiling.camera import CameraWords
 
     return CameraWords(flags["image"], flags["odom"], flags["base_frame"], flags["camera_pose"], flags["urdf"])

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wallkit.calib.store import read_calibration
+from wallkit.calib.files.store import read_calibration
 from wallkit.core.calibration import Calibration
 from wallkit.core.types import CameraImage, CameraInfo, UInt8Array
 from wallkit.errors import CalibrationError, ConfigError, LogError, closest

@@ -34,7 +34,7 @@ from wallkit.logs.sync import SyncReport
 from wallkit.logs.topics import pick_initial_pose, pick_truth
 from wallkit.logs.trajectories import first_pose, trajectory_of
 from wallkit.pipelines.cameras import CameraRequest
-from wallkit.pipelines.ceiling_camera import CameraWords
+from wallkit.pipelines.ceiling.camera import CameraWords
 from wallkit.pipelines.config import Config
 from wallkit.pipelines.localize_ceiling import Overhead, alone, checked, find_overhead, frames_and_views, seen_by
 from wallkit.pipelines.maps import LoadedMap, load_map

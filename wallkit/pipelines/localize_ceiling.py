@@ -25,7 +25,7 @@ from wallkit.logs.rig import Rig
 from wallkit.logs.sync import SyncReport, synchronise
 from wallkit.maps.ceiling.files import read_ceiling
 from wallkit.maps.grids.fields import MapsSettings
-from wallkit.pipelines.ceiling_camera import CameraWords, UpCamera, find_up_camera, is_grey, sights_of
+from wallkit.pipelines.ceiling.camera import CameraWords, UpCamera, find_up_camera, is_grey, sights_of
 from wallkit.pipelines.config import Config
 from wallkit.pipelines.maps import LoadedMap, load_map
 

@@ -15,10 +15,10 @@ from wallkit.core.results import Value
 from wallkit.maps.exporters import ExportOptions
 from wallkit.pipelines.demo import SAMPLE, run_demo
 from wallkit.pipelines.evaluate import Evaluation
-from wallkit.pipelines.map_export import plan_export, write_export
+from wallkit.pipelines.map.export import plan_export, write_export
 from wallkit.pipelines.run_folder import RunRecord, write_json
 from wallkit.pipelines.sample_camera import write_calibration
-from wallkit.pipelines.simulate_log import LogRequest, simulate_log
+from wallkit.pipelines.simulate.log import LogRequest, simulate_log
 from wallkit.simulate.scenario import read_scenario
 
 SEED = 20

@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from wallkit.calib.boards import Board
-from wallkit.calib.store import toml_from_calibration
+from wallkit.calib.board.boards import Board
+from wallkit.calib.files.store import toml_from_calibration
 from wallkit.errors import CalibrationError
-from wallkit.pipelines.calib_captures import CaptureRequest
-from wallkit.pipelines.calib_intrinsics import calibrate_camera
-from wallkit.pipelines.calib_verify import VerifyRequest, verify_calibration
-from wallkit.pipelines.calibrate_extrinsics import run_extrinsics
-from wallkit.pipelines.calibrate_request import gather, options_from_words, provenance
-from wallkit.pipelines.simulate_boards import BoardRequest, simulate_boards
+from wallkit.pipelines.calib.captures import CaptureRequest
+from wallkit.pipelines.calib.extrinsics import run_extrinsics
+from wallkit.pipelines.calib.intrinsics import calibrate_camera
+from wallkit.pipelines.calib.request import gather, options_from_words, provenance
+from wallkit.pipelines.calib.verify import VerifyRequest, verify_calibration
+from wallkit.pipelines.simulate.boards import BoardRequest, simulate_boards
 from wallkit.simulate.board_room import BoardPoses
 from wallkit.simulate.robot import robot_from_urdf
 from wallkit.simulate.scenario import Scenario

@@ -230,7 +230,7 @@ Looks = tuple[Callable[[CameraImage], Segmentation], tuple[str, ...], tuple[str,
 
 def _oracle(log: Log, settings: SegmentSettings) -> Looks:
     """What a simulator recorded, as a model that is never wrong."""
-    from wallkit.pipelines.simulate_camera import NO_CLASS
+    from wallkit.pipelines.simulate.camera import NO_CLASS
     from wallkit.segment.class_map import class_map
 
     names = oracle_names(log)

@@ -1,0 +1,1 @@
+"""The board: what it is, printed, and its corners in pictures."""

@@ -1,0 +1,1 @@
+"""Calibrations as files: wallkit's TOML, ROS and Kalibr YAML, a robot's URDF."""

@@ -1,0 +1,1 @@
+"""What the `calib` commands do."""

@@ -1,0 +1,1 @@
+"""What the `ceiling` commands do."""

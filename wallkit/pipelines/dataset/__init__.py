@@ -1,0 +1,1 @@
+"""What the `dataset` commands do."""

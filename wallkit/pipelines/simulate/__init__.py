@@ -1,0 +1,1 @@
+"""What the `simulate` commands do."""
