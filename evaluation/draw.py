@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Literal
 
 from wallkit.maps.classes import ClassInfo
 from wallkit.maps.draft.doors import DraftDoor
@@ -137,8 +138,8 @@ def pane_in(name: str, at: float, wide: float, low: float, high: float) -> Draft
     return DraftOpening(f"w_{name}", "window", (at, at + wide), (low, high), DraftPane(f"pane_{name}", "glass"))
 
 
-def leaf(name: str, side: str) -> DraftDoor:
-    return DraftDoor(f"door_{name}", "hinged", "start", side, connects=("corridor", name))  # type: ignore[arg-type]
+def leaf(name: str, side: Literal["left", "right"]) -> DraftDoor:
+    return DraftDoor(f"door_{name}", "hinged", "start", side, connects=("corridor", name))
 
 
 def room(name: str, kind: str, x0: float, y0: float, x1: float, y1: float) -> DraftRoom:

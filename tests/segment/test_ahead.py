@@ -98,7 +98,10 @@ def test_an_image_that_the_next_scan_needs_is_looked_at_after_all():
 def test_without_an_image_and_unreadable_ones_are_counted():
     report = LookReport()
     frames = [frame(0, None), frame(100, 100), frame(110, 100), frame(200, 200)]
-    look = lambda image: None if image.stamp_ns == 10**8 else answer(image)  # noqa: E731
+
+    def look(image):
+        return None if image.stamp_ns == 10**8 else answer(image)
+
     assert shown(look_ahead(frames, look, report=report)) == [None, None, None, 200]
     assert report == LookReport(looked=1, unreadable=1, without_image=1)
     assert report.lines() == ["1 images segmented", "1 images that could not be read", "1 scans without an image"]

@@ -93,6 +93,14 @@ def options(*decorators: Callable[[F], F]) -> Callable[[F], F]:
     return apply
 
 
+def pixel_size(ctx: click.Context, option: click.Parameter, text: str) -> tuple[int, int]:
+    """Callback of a `--size WxH`: (width, height)."""
+    width, _, height = text.lower().partition("x")
+    if not (width.isdigit() and height.isdigit()):
+        raise click.BadParameter(f"'{text}' is no size; write it as {option.default}")
+    return int(width), int(height)
+
+
 # what changes no result, or only where it goes
 _NOT_REMEMBERED = {"out", "overwrite", "as_json", "quiet", "dry_run", "report", "ros", "write"}
 

@@ -14,7 +14,7 @@ COLUMNS = (
     ("updates_to_converge", "converged after", "updates", 1.0),
     ("false_healthy", "false healthy", "scans", 1.0),
     ("availability", "available", "%", 100.0),
-    ("update_mean_ms", "per update", "ms", 1.0),
+    ("update_median_ms", "per update", "ms", 1.0),
 )
 
 

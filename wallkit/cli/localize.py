@@ -262,7 +262,7 @@ def five_lines(run: Run, record: RunRecord, evaluation: Evaluation, out: Path) -
         )
     else:
         lines.append("wrong    not known: the log holds no truth (--truth)")
-    wall, updates = record.resources["wall_s"].value or 0.0, numbers["update_mean_ms"].value or 0.0
+    wall, updates = record.resources["wall_s"].value or 0.0, numbers["update_median_ms"].value or 0.0
     span = (record.steps.stamps_ns[-1] - record.steps.stamps_ns[0]) / 1e9
     lines.append(
         f"fast     {wall:.1f} s for {span:.0f} s of log; {updates:.2f} ms per update, {numbers['updates'].value:.0f} updates"

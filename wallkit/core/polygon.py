@@ -147,7 +147,7 @@ def _crossing(points: Any, edges: Any, boxes: Any, bands: Any, members: Any, fou
         x, y = points[k, 0], points[k, 1]
         found[k] = -1
         for p in range(len(boxes)):
-            if not (boxes[p, 0] <= x and x <= boxes[p, 2] and boxes[p, 1] <= y and y <= boxes[p, 3]):
+            if not _is_in_box(x, y, boxes, p):
                 continue
             crossed = 0
             band = _band_of(y, boxes, p, bands.shape[1] - 1)
@@ -167,7 +167,7 @@ def _winding(points: Any, edges: Any, boxes: Any, bands: Any, members: Any, foun
         x, y = points[k, 0], points[k, 1]
         found[k] = -1
         for p in range(len(boxes)):
-            if not (boxes[p, 0] <= x and x <= boxes[p, 2] and boxes[p, 1] <= y and y <= boxes[p, 3]):
+            if not _is_in_box(x, y, boxes, p):
                 continue
             winds = 0
             band = _band_of(y, boxes, p, bands.shape[1] - 1)
@@ -188,7 +188,7 @@ def _even_odd(points: Any, edges: Any, boxes: Any, bands: Any, members: Any, fou
         x, y = points[k, 0], points[k, 1]
         found[k] = -1
         for p in range(len(boxes)):
-            if not (boxes[p, 0] <= x and x <= boxes[p, 2] and boxes[p, 1] <= y and y <= boxes[p, 3]):
+            if not _is_in_box(x, y, boxes, p):
                 continue
             is_in = False
             band = _band_of(y, boxes, p, bands.shape[1] - 1)
@@ -200,6 +200,11 @@ def _even_odd(points: Any, edges: Any, boxes: Any, bands: Any, members: Any, fou
             if is_in:
                 found[k] = p
                 break
+
+
+@njit(inline="always")
+def _is_in_box(x: Any, y: Any, boxes: Any, p: int) -> Any:
+    return boxes[p, 0] <= x and x <= boxes[p, 2] and boxes[p, 1] <= y and y <= boxes[p, 3]
 
 
 @njit(inline="always")

@@ -13,7 +13,7 @@ import numpy as np
 
 from wallkit.core.ceiling import CeilingMap, CeilingSight, CeilingView
 from wallkit.core.ceiling_eye import CeilingEye
-from wallkit.core.types import FieldSet, Float64Array, Frame, OccupancyGrid, Points
+from wallkit.core.types import CameraImage, FieldSet, Float64Array, Frame, OccupancyGrid, Points
 from wallkit.errors import ConfigError, Finding, LogError, MapError
 from wallkit.localize.ceiling import CentrePixel
 from wallkit.localize.ceiling_eye import fields_of_ceiling
@@ -82,7 +82,7 @@ def find_overhead(log: Log, path: Path | None, words: CameraWords, config: Confi
             hint="add `height: 2.7` [m above the floor]; `wallkit ceiling fit` and `build` find it from a log",
         )
     first = log.first(up.channel.topic)[0].value
-    if is_grey(first) and settings.model.needs_colour:  # type: ignore[arg-type]
+    if isinstance(first, CameraImage) and is_grey(first) and settings.model.needs_colour:
         raise LogError(
             f"the images on {up.channel.topic} are grey, and this model compares colours",
             where=log.name,

@@ -6,13 +6,14 @@ that no camera sees, or of a picture that says nothing there, keeps `unseen_weig
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wallkit.core.config import setting
-from wallkit.core.types import BoolArray, Estimate, FieldSet, Float32Array, LabelledScan
+from wallkit.core.types import Estimate, FieldSet, Float32Array, LabelledScan
 
 if TYPE_CHECKING:
     from wallkit.points.filters import BoundFilter
@@ -39,12 +40,7 @@ class WallMask:
 
     def weigh(self, scan: LabelledScan, estimate: Estimate) -> Float32Array:
         """See BoundFilter."""
-        known = _known(scan)
-        if known is None:
-            return np.full(len(scan.weights), self.unseen_weight, dtype=np.float32)
-        seen, shares = known
-        kept = shares @ _chosen(scan.classes, self.keep) >= _WHOLE
-        return np.where(seen, kept, np.float32(self.unseen_weight)).astype(np.float32)
+        return _judged(scan, self.unseen_weight, lambda shares: shares @ _chosen(scan.classes, self.keep) >= _WHOLE)
 
 
 @dataclass(frozen=True)
@@ -64,12 +60,9 @@ class RejectDynamic:
 
     def weigh(self, scan: LabelledScan, estimate: Estimate) -> Float32Array:
         """See BoundFilter."""
-        known = _known(scan)
-        if known is None:
-            return np.full(len(scan.weights), self.unseen_weight, dtype=np.float32)
-        seen, shares = known
-        kept = shares @ _chosen(scan.classes, self.reject) <= 1 - _WHOLE
-        return np.where(seen, kept, np.float32(self.unseen_weight)).astype(np.float32)
+        return _judged(
+            scan, self.unseen_weight, lambda shares: shares @ _chosen(scan.classes, self.reject) <= 1 - _WHOLE
+        )
 
 
 @dataclass(frozen=True)
@@ -103,15 +96,10 @@ class SoftMask:
 
     def weigh(self, scan: LabelledScan, estimate: Estimate) -> Float32Array:
         """See BoundFilter."""
-        known = _known(scan)
-        if known is None:
-            return np.full(len(scan.weights), self.unseen_weight, dtype=np.float32)
-        seen, shares = known
         priors = np.array([getattr(self, name, self.other) for name in scan.classes], dtype=np.float32)
         sure = np.float32(1.0) if scan.confidences is None else scan.confidences
         doubt = np.float32(self.background)
-        weights = sure * (shares @ priors) + (1 - sure) * doubt
-        return np.where(seen, weights, np.float32(self.unseen_weight)).astype(np.float32)
+        return _judged(scan, self.unseen_weight, lambda shares: sure * (shares @ priors) + (1 - sure) * doubt)
 
     @staticmethod
     def classes() -> tuple[str, ...]:
@@ -119,14 +107,15 @@ class SoftMask:
         return tuple(f.name for f in fields(SoftMask) if f.name != "unseen_weight")
 
 
-def _known(scan: LabelledScan) -> tuple[BoolArray, Float32Array] | None:
-    """(K,) which returns carry a label, and (K, C) their shares; None where no camera looked at all."""
+def _judged(scan: LabelledScan, unseen_weight: float, judge: Callable[[Float32Array], Any]) -> Float32Array:
+    """(K,) weights: `judge` of the shares (K, C) where a camera says something, `unseen_weight` elsewhere."""
     if scan.labels is None or not scan.classes:
-        return None
+        return np.full(len(scan.weights), unseen_weight, dtype=np.float32)
     seen = scan.labels >= 0
-    if scan.shares is not None:
-        return seen, scan.shares
-    return seen, np.eye(len(scan.classes), dtype=np.float32)[scan.labels] * seen[:, None]
+    shares = scan.shares
+    if shares is None:
+        shares = np.eye(len(scan.classes), dtype=np.float32)[scan.labels] * seen[:, None]
+    return np.where(seen, judge(shares), np.float32(unseen_weight)).astype(np.float32)
 
 
 def _chosen(classes: tuple[str, ...], names: tuple[str, ...]) -> Float32Array:

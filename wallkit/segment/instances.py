@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -118,6 +119,16 @@ def _between(at: float, cell: float, count: int) -> tuple[int, int, float]:
     return first, min(first + 1, count - 1), position - first
 
 
+@njit(inline="always")
+def _between_cells(sums: Any, rows: Any, columns: Any) -> Any:
+    """Bilinear, between the rows and the columns that `_between` gives."""
+    top, bottom, b = rows
+    left, right, a = columns
+    upper = sums[top, left] * (1 - a) + sums[top, right] * a
+    lower = sums[bottom, left] * (1 - a) + sums[bottom, right] * a
+    return upper * (1 - b) + lower * b
+
+
 @njit(cache=True, nogil=True, fastmath=True)
 def _sample(pixels, at, size, boxes, scores, labels, coefficients, prototypes, cell, out, sure):  # type: ignore[no-untyped-def]
     """Fills `out` and `sure` (K,) for pixels (K, 2) of an image of a size (2,) that lie `at` (K, 2) in the input."""
@@ -162,14 +173,11 @@ def _paint(sums, boxes, scores, labels, u, v, cell, out, sure):  # type: ignore[
         for i in range(len(v)):
             if v[i] < boxes[d, 1] or v[i] >= boxes[d, 3]:
                 continue
-            top, bottom, b = _between(v[i], cell[1], sums.shape[1])
+            rows = _between(v[i], cell[1], sums.shape[1])
             for j in range(len(u)):
                 if u[j] < boxes[d, 0] or u[j] >= boxes[d, 2]:
                     continue
-                left, right, a = _between(u[j], cell[0], sums.shape[2])
-                upper = sums[d, top, left] * (1 - a) + sums[d, top, right] * a
-                lower = sums[d, bottom, left] * (1 - a) + sums[d, bottom, right] * a
-                total = upper * (1 - b) + lower * b
+                total = _between_cells(sums[d], rows, _between(u[j], cell[0], sums.shape[2]))
                 chance = scores[d] / (1.0 + np.exp(-total))
                 if total > 0 and chance > best[i, j]:
                     best[i, j], out[i, j] = chance, labels[d]
@@ -187,11 +195,8 @@ def _paint_each(sums, boxes, u, v, cell, out):  # type: ignore[no-untyped-def]
         for i in range(len(v)):
             if v[i] < boxes[d, 1] or v[i] >= boxes[d, 3]:
                 continue
-            top, bottom, b = _between(v[i], cell[1], sums.shape[1])
+            rows = _between(v[i], cell[1], sums.shape[1])
             for j in range(len(u)):
                 if u[j] < boxes[d, 0] or u[j] >= boxes[d, 2]:
                     continue
-                left, right, a = _between(u[j], cell[0], sums.shape[2])
-                upper = sums[d, top, left] * (1 - a) + sums[d, top, right] * a
-                lower = sums[d, bottom, left] * (1 - a) + sums[d, bottom, right] * a
-                out[d, i, j] = upper * (1 - b) + lower * b > 0
+                out[d, i, j] = _between_cells(sums[d], rows, _between(u[j], cell[0], sums.shape[2])) > 0

@@ -13,16 +13,11 @@ if TYPE_CHECKING:
     from wallkit.train.curves import Epoch
 
 
-def _size(ctx: click.Context, option: click.Parameter, text: str) -> tuple[int, int]:
-    width, _, height = text.lower().partition("x")
-    if not (width.isdigit() and height.isdigit()):
-        raise click.BadParameter(f"'{text}' is no size; write it as 256x192")
-    return int(width), int(height)
-
-
 @click.command("train")
 @click.argument("datasets", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="DATASET...")
-@click.option("--size", default="256x192", show_default=True, callback=_size, metavar="WxH", help="Of its input [px].")
+@click.option(
+    "--size", default="256x192", show_default=True, callback=common.pixel_size, metavar="WxH", help="Of its input [px]."
+)
 @click.option("--epochs", type=click.IntRange(1), metavar="N", help="Passes; else 30 (YOLO: 50).")
 @click.option("--batch", type=click.IntRange(1), metavar="N", help="Pictures in a step; else 8 (YOLO: 16).")
 @click.option("--rate", type=float, metavar="X", help="Highest learning rate; else 0.003.")

@@ -13,13 +13,6 @@ if TYPE_CHECKING:
     from wallkit.dataset.classes import LabelSet
 
 
-def _size(ctx: click.Context, option: click.Parameter, text: str) -> tuple[int, int]:
-    width, _, height = text.lower().partition("x")
-    if not (width.isdigit() and height.isdigit()):
-        raise click.BadParameter(f"'{text}' is no size; write it as 640x480")
-    return int(width), int(height)
-
-
 @click.command("dataset")
 @click.option("--images", type=int, default=3000, show_default=True, metavar="N", help="Pictures to make.")
 @click.option(
@@ -30,7 +23,9 @@ def _size(ctx: click.Context, option: click.Parameter, text: str) -> tuple[int, 
     metavar="MAP",
     help="In these, in turn; else in random ones.",
 )
-@click.option("--size", default="640x480", show_default=True, callback=_size, metavar="WxH", help="Of a picture [px].")
+@click.option(
+    "--size", default="640x480", show_default=True, callback=common.pixel_size, metavar="WxH", help="Of a picture [px]."
+)
 @click.option("--per-scene", type=int, default=12, show_default=True, metavar="N", help="Pictures in one scene.")
 @click.option("--val", type=float, default=0.2, show_default=True, metavar="SHARE", help="Of scenes, for validation.")
 @click.option(
