@@ -46,6 +46,7 @@ def test_false_healthy_and_availability():
     assert values["false_healthy"].value == 2
     assert values["availability"].value == pytest.approx(2 / 3)
     assert values["lost_episodes"].value == 1
+    assert values["lost_share"].value == pytest.approx(2 / 7)
 
 
 def test_availability_without_a_good_update_does_not_exist():

@@ -43,6 +43,12 @@ def judge(errors: Errors, steps: Steps, limits: Limits) -> dict[str, Value]:
             "episodes",
             f"times the estimate went more than {wrong} off",
         ),
+        Value(
+            "lost_share",
+            float(np.mean(is_lost(errors, limits))),
+            "share",
+            f"share of the scans at which the estimate is more than {wrong} off",
+        ),
     )
     return {value.key: value for value in values}
 
