@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from wallkit.cli import common
+from wallkit.cli import common, read_batch
 
 if TYPE_CHECKING:
     from wallkit.pipelines.evaluate import EvaluateSettings, Evaluation
@@ -66,6 +66,7 @@ def evaluate(ctx: click.Context, /, runs: tuple[Path, ...], as_json: bool, **fla
     "-o", "--out", type=click.Path(path_type=Path), metavar="FILE.html", help="Write the comparison as a page."
 )
 @click.option("--paper", is_flag=True, help="A row for each: time, CPU, mean error, updates to converge, sd, memory.")
+@read_batch.batch_options
 @common.config_option
 @common.set_option
 @common.seed_option
@@ -77,14 +78,20 @@ def compare(
 
     RUN is a result folder, of one seed or several, or a folder of such folders: one configuration over several logs.
 
+    With --paper or an option for many logs, all intervals and tests are over logs, since runs of one log are alike.
+
     \b
     Examples:
       wallkit compare basic.wallkit filtered.wallkit
       wallkit compare a/ b/ c/ -o compare.html
       wallkit compare --paper basic/ wall_mask/ soft_mask/
+      wallkit compare basic/ wall_mask/ --by people --names "{scene}-{people}-{take}"
     """
     from dataclasses import asdict
 
+    if read_batch.is_for(runs, {**flags, "paper": paper}):
+        read_batch.compare(runs, _names(runs), flags, is_paper=paper, as_json=as_json)
+        return
     from wallkit.pipelines.report import COMPARED, COMPARED_IN_PAPERS, compare_runs, write_compare_report
     from wallkit.report.compare import compare_rows, difference_rows
     from wallkit.report.paper import paper_differences, paper_headers, paper_rows

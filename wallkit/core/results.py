@@ -113,3 +113,70 @@ class Comparison:
     pairs: int
     method: str
     better: Literal["a", "b", "neither"]
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """A number and the 95 % interval it lies in; None: too little was measured to tell."""
+
+    value: float
+    low: float | None = None
+    high: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Distribution:
+    """One metric over the runs of many logs, every log counting alike.
+
+    Attributes:
+        mean, median, tail: tail is the number that 95 % of the runs are better than. Intervals are over logs.
+        worst, worst_row: of the values that were given; an extreme has no interval.
+        sd: over the runs. sd_seeds: within a log, over its seeds; None if no log has two runs.
+        runs, logs: with the number. without: runs that ended but do not have it.
+    """
+
+    key: str
+    unit: str
+    mean: Interval
+    median: Interval
+    tail: Interval
+    worst: float
+    worst_row: int
+    sd: float | None
+    sd_seeds: float | None
+    runs: int
+    logs: int
+    without: int
+
+
+@dataclass(frozen=True, slots=True)
+class Paired:
+    """How much b differs from a over the logs that both have.
+
+    Attributes:
+        mean_a, mean_b: over the paired runs, every log counting alike.
+        difference: b - a in the metric's unit. percent: of a's mean; None where that has no meaning (shares, a of zero).
+        middle: median over the units of the change in per cent of a: what the test is about, where few logs decide the mean.
+        p_value: two-sided, of this comparison alone. p_holm: corrected for all that were made at once.
+        units: how many independent things were compared. over: what they are.
+        pairs: runs that have a partner. alone_a, alone_b: runs with the number that have none.
+        b_better, a_better: on how many units.
+    """
+
+    key: str
+    unit: str
+    mean_a: float
+    mean_b: float
+    difference: Interval
+    percent: Interval | None
+    middle: Interval | None
+    p_value: float | None
+    p_holm: float | None
+    units: int
+    over: Literal["logs", "seeds of one log"]
+    pairs: int
+    alone_a: int
+    alone_b: int
+    b_better: int
+    a_better: int
+    better: Literal["a", "b", "neither"]

@@ -39,7 +39,7 @@ def compare_seeds(
     differences = np.array([v.value for v in b], dtype=np.float64) - np.array([v.value for v in a], dtype=np.float64)
     means = differences[rng.integers(0, len(differences), (resamples, len(differences)))].mean(axis=1)
     low, high = np.percentile(means, [2.5, 97.5]).tolist()
-    p_value = _signed_rank_p(differences)
+    p_value = signed_rank_p(differences)
     # n pairs cannot give less than 2 / 2^n: five agreeing seeds are not yet significant
     least = 2.0 ** (1 - len(differences))
     method = "Wilcoxon signed-rank over seeds" + (f"; p cannot fall below {least:.3g}" if least > SIGNIFICANT_P else "")
@@ -72,7 +72,8 @@ def compare_errors(rng: np.random.Generator, a: Errors, b: Errors, *, resamples:
     return _comparison(label, statistics, count, f"block bootstrap over time, {block} updates a block")
 
 
-def _signed_rank_p(differences: Float64Array) -> float:
+def signed_rank_p(differences: Float64Array) -> float:
+    """Two-sided p of Wilcoxon's signed-rank test (1945) on differences (N,); 1 where nothing differs."""
     from scipy import stats
 
     if not differences.any():

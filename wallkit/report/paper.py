@@ -56,7 +56,7 @@ def _cell(contender: Contender, column: Column) -> str:
     value, spread = contender.metrics.get(column.key), contender.spreads.get(column.key)
     unit = value.unit if value else spread.unit if spread else ""
     found = _STATISTICS[column.statistic](contender, column.key)
-    return MISSING if found is None else _text(found, unit)
+    return MISSING if found is None else paper_text(found, unit)
 
 
 def paper_differences(data: CompareData) -> list[str]:
@@ -64,14 +64,14 @@ def paper_differences(data: CompareData) -> list[str]:
     found = []
     for a, b, c in data.differences:
         verdict = {"a": f"{a} is better", "b": f"{b} is better", "neither": "no difference can be told"}[c.better]
-        low, high = _text(c.low, c.unit), _text(c.high, c.unit)
-        what = f"{c.key}: {verdict}: {b} - {a} = {_text(c.difference, c.unit)} (95 % between {low} and {high})"
+        low, high = paper_text(c.low, c.unit), paper_text(c.high, c.unit)
+        what = f"{c.key}: {verdict}: {b} - {a} = {paper_text(c.difference, c.unit)} (95 % between {low} and {high})"
         found.append(f"{what} [p = {c.p_value:.2g}, {c.pairs} pairs, {c.method}]")
     return found
 
 
-def _text(number: float, unit: str) -> str:
-    """Errors in hundredths of a centimetre, updates in tenths."""
+def paper_text(number: float, unit: str) -> str:
+    """A number as papers print it: errors in hundredths of a centimetre, updates in tenths."""
     return (
         f"{100 * number:.2f} cm" if unit == "m" else f"{number:.1f}" if unit == "updates" else number_text(number, unit)
     )

@@ -1,0 +1,1 @@
+"""Many runs of many logs: made, kept, and read."""
