@@ -29,6 +29,12 @@ def test_the_best_of_equals_is_rarely_lost():
     assert wrong <= 10
 
 
+def test_few_logs_exclude_nothing():
+    found = find_best(np.random.default_rng(0), np.tile([1.0, 2.0, 3.0], (5, 1)))
+    assert found.may_be.all()
+    assert found.chances.tolist() == [1, 0, 0]
+
+
 def test_the_front_is_what_no_other_beats():
     costs = np.array([1.0, 2.0, 2.0, 3.0, 4.0, np.nan])
     losses = np.array([9.0, 5.0, 4.0, 4.0, 1.0, 0.0])

@@ -1,6 +1,7 @@
 """A batch with known differences: they are found, equals stay equal, and no run is dropped in silence."""
 
 import json
+from dataclasses import replace
 
 import pytest
 from click.testing import CliRunner
@@ -9,7 +10,9 @@ from tests.pipelines.batch_runs import PEOPLE, PLACES, SEEDS, TAKES, drawn, draw
 from wallkit.cli.app import main
 from wallkit.errors import WallkitError
 from wallkit.pipelines.batch.compare import Question, compare_batch
-from wallkit.pipelines.batch.runs import DONE, FAILED, MISSING, levels_of, natural, with_parts_of_names
+from wallkit.pipelines.batch.gather import gather
+from wallkit.pipelines.batch.labels import labels_of_runs
+from wallkit.pipelines.batch.runs import DONE, FAILED, MISSING, levels_of, natural, where, with_parts_of_names
 from wallkit.report import batch_words as words
 
 EACH = len(PLACES) * len(PEOPLE) * len(TAKES) * len(SEEDS)
@@ -34,12 +37,6 @@ def test_a_gain_of_a_fifth_is_found_and_said_and_an_equal_is_not():
 
 def test_the_same_runs_twice_differ_in_nothing():
     rows = list(drawn_rows({"basic": 1.0}))
-    runs = drawn({"basic": 1.0})
-    from dataclasses import replace
-
-    from wallkit.pipelines.batch.gather import gather
-    from wallkit.pipelines.batch.labels import labels_of_runs
-
     runs = gather([*rows, *(replace(row, configuration="twin") for row in rows)], labels_of_runs())
     (difference,) = told(runs).differences["error_mean_m"]
     assert (difference.found.p_holm, difference.found.difference.low, difference.found.difference.high) == (1, 0, 0)
@@ -92,6 +89,35 @@ def test_another_baseline_and_metric():
     (basic,) = data.differences["update_mean_ms"]
     assert (basic.name, basic.found.better, basic.found.percent.value) == ("basic", "b", -75.0)
     assert [r.configuration for r in data.worst[:3]] == ["soft"] * 3
+
+
+def test_only_some_of_the_logs():
+    data = told(where(drawn({"basic": 1.0, "soft": 0.8}), "crowd=2, 12"))
+    assert (data.logs, data.summaries[0].done, data.differences["error_mean_m"][0].found.units) == (12, 36, 12)
+    data = told(where(drawn({"basic": 1.0, "soft": 0.8, "same": 1.0}), "configuration=same,soft"))
+    assert [s.name for s in data.summaries] == ["soft", "same"]
+    few = told(where(drawn({"basic": 1.0, "soft": 0.8}), "log=hall-0-1,lab-0-1"))
+    (soft,) = few.differences["error_mean_m"]
+    assert "2 logs, better on 2 (too few: p cannot be below 0.5)" in words.difference_line(soft, few.key, "basic")
+    assert words.contest_lines(few.contest, few.key) == ["The best cannot be named: 2 logs that all have are too few."]
+    for bad, message in (("crowd", "says no values"), ("crowd=3", "no run has crowd = 3"), ("size=1", "by 'size'")):
+        with pytest.raises(WallkitError, match=message):
+            where(drawn({"basic": 1.0}), bad)
+
+
+def test_a_gain_that_a_few_logs_decide_is_called_that():
+    """Better on most logs and lost on two: neither better nor worse."""
+    rows = list(drawn_rows({"basic": 1.0, "soft": 0.8}))
+    lost = {("soft", "hall-0-1"), ("soft", "office-2-2")}
+    spoilt = [
+        replace(r, metrics={**r.metrics, "error_mean_m": 2.0}) if (r.configuration, r.log) in lost else r for r in rows
+    ]
+    (soft,) = told(gather(spoilt, labels_of_runs())).differences["error_mean_m"]
+    assert soft.found.better == "neither"
+    line = words.difference_line(soft, "error_mean_m", "basic")
+    assert line.startswith("soft: error is better on 16 of 18 logs than with basic (-18.4 % on the middle one")
+    assert "% higher with a 95 % interval" in line
+    assert line.endswith("is decided by a few")
 
 
 @pytest.mark.parametrize(

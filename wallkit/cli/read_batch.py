@@ -20,6 +20,7 @@ batch_options = common.options(
     click.option("--baseline", metavar="NAME", help="Many logs: what the others are compared with; else the first."),
     click.option("--metric", "metrics", multiple=True, metavar="KEY", help="Many logs: what is tested (repeatable)."),
     click.option("--by", multiple=True, metavar="KEY", help="Many logs: a table by a tag or a setting (repeatable)."),
+    click.option("--where", multiple=True, metavar="KEY=A,B", help="Many logs: only those with one of these values."),
     click.option("--names", metavar="PATTERN", help="Many logs: tags from their names, as {scene}-{people}-{take}."),
 )
 
@@ -28,7 +29,9 @@ def is_for(runs: tuple[Path, ...], flags: dict[str, Any]) -> bool:
     """Whether what is named are many logs: folders of folders, and an option that only makes sense there."""
     from wallkit.pipelines.batch.folders import is_folder_of_runs
 
-    asked = [f"--{name}" for name in ("baseline", "metric", "by", "names") if flags.get(_PLURAL.get(name, name))]
+    asked = [
+        f"--{name}" for name in ("baseline", "metric", "by", "where", "names") if flags.get(_PLURAL.get(name, name))
+    ]
     others = [run for run in runs if not is_folder_of_runs(run)]
     if asked and others:
         message = f"{', '.join(asked)} is for folders of result folders, and {others[0]} is none"
@@ -49,11 +52,13 @@ def read(runs: tuple[Path, ...], names: list[str], flags: dict[str, Any], *, is_
     """The runs, compared as the flags say."""
     from wallkit.pipelines.batch.compare import compare_batch
     from wallkit.pipelines.batch.folders import read_folders
-    from wallkit.pipelines.batch.runs import with_parts_of_names
+    from wallkit.pipelines.batch.runs import where, with_parts_of_names
 
     found = read_folders(runs, names)
     if flags["names"]:
         found = with_parts_of_names(found, flags["names"])
+    for words in flags["where"]:
+        found = where(found, words)
     return compare_batch(found, _question(flags, is_paper=is_paper), title=" against ".join(names))
 
 
@@ -76,7 +81,7 @@ def say(data: BatchData, *, is_paper: bool) -> None:
             click.echo(_text(words.factor_table(factor, key)))
         if is_paper:
             for level in factor.levels:
-                click.echo(f"\n{factor.key} = {level.name}, {level.logs} logs")
+                click.echo(f"\n{factor.key} = {level.name}, {words.count_text(level.logs, 'log')}")
                 click.echo(_text(words.paper_table(level.summaries)))
     if data.factors and len(data.summaries) > 1:
         click.echo(words.star_line(data))

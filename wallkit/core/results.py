@@ -160,7 +160,7 @@ class Paired:
         p_value: two-sided, of this comparison alone. p_holm: corrected for all that were made at once.
         units: how many independent things were compared. over: what they are.
         pairs: runs that have a partner. alone_a, alone_b: runs with the number that have none.
-        b_better, a_better: on how many units.
+        b_better, a_better: on how many units. with_mean: on how many the difference has the sign of its mean.
     """
 
     key: str
@@ -179,4 +179,5 @@ class Paired:
     alone_b: int
     b_better: int
     a_better: int
+    with_mean: int
     better: Literal["a", "b", "neither"]

@@ -9,6 +9,9 @@ import numpy as np
 from wallkit.core.types import BoolArray, Float64Array, Int64Array
 from wallkit.evaluate.statistics import SIGNIFICANT_P
 
+# with five, no signed-rank test reaches p = 0.05 either
+FEWEST_LOGS = 6
+
 
 @dataclass(frozen=True, slots=True)
 class Best:
@@ -34,6 +37,8 @@ def find_best(rng: np.random.Generator, losses: Float64Array, *, resamples: int 
     Testing all against the winner would forget that the winner was chosen by its luck on these logs. Here the worst is
     thrown out while the remaining ones differ, so nothing is compared with a winner.
 
+    Fewer than six logs exclude none: resampled, they would look surer than any test of so few could be.
+
     Args:
         losses: (L, M) one number per log and configuration, the lower the better, none missing.
     """
@@ -41,7 +46,7 @@ def find_best(rng: np.random.Generator, losses: Float64Array, *, resamples: int 
     drawn = rng.multinomial(logs, np.full(logs, 1 / logs), size=resamples) @ losses / logs
     centred, means = drawn - losses.mean(axis=0), losses.mean(axis=0)
     p_values, alive, so_far = np.ones(count), np.arange(count), 0.0
-    while len(alive) > 1:
+    while len(alive) > 1 and logs >= FEWEST_LOGS:
         excess = means[alive] - means[alive].mean()
         noise = centred[:, alive] - centred[:, alive].mean(axis=1, keepdims=True)
         # configurations that give the very same numbers have neither excess nor noise

@@ -86,7 +86,8 @@ def compare_pairs(
     return Paired(
         label.key, label.unit, float(unit_a.mean()), float(unit_b.mean()), difference, percent, middle, p_value, p_value,
         len(unit_a), over, len(common), len(pairs_a) - len(common), len(pairs_b) - len(common),
-        int(np.sum(gain < 0)), int(np.sum(gain > 0)), _better(label, difference, p_value),
+        int(np.sum(gain < 0)), int(np.sum(gain > 0)), int(np.sum((unit_b - unit_a) * difference.value > 0)),
+        _better(label, difference, p_value),
     )  # fmt: skip
 
 

@@ -25,7 +25,7 @@ WORDS = {
 Table = tuple[list[str], list[list[str]]]
 # in a sentence: more of it and less of it
 _SIDES = dict.fromkeys(("updates_to_converge", "false_healthy"), ("more", "fewer"))
-_SIGNIFICANT_P = 0.05
+_SIGNIFICANT_P, _FEWEST_LOGS = 0.05, 6
 _SHOWN_RUNS = 5
 
 
@@ -80,7 +80,7 @@ def factor_table(factor: Factor, key: str) -> Table:
     """The mean of a metric by configuration and level; what differs from the baseline, and `*` where that is certain."""
     cells = {(s.name, level.name): _level_cell(level, s, key) for level in factor.levels for s in level.summaries}
     names = [s.name for s in factor.levels[0].summaries] if factor.levels else []
-    levels = [(level.name, f"{level.name} ({_count(level.logs, 'log')})") for level in factor.levels]
+    levels = [(level.name, f"{level.name} ({count_text(level.logs, 'log')})") for level in factor.levels]
     # the longer of the two goes down the page
     if len(levels) > max(len(names), 8):
         return [factor.key, *names], [[text, *(cells[n, level] for n in names)] for level, text in levels]
@@ -124,7 +124,9 @@ def difference_line(difference: Difference, key: str, baseline: str) -> str:
         rows = f"{word} {_most(found)} than with {baseline} ({_middle(found)}{_p_text(found)})"
         but = f"the mean, {_size(found, number)} {side} with a {_interval(found, number)}, is decided by a few"
         return f"{name}: {rows}; {but}{_left_out(found, name, baseline)}"
-    how_sure = f"{_interval(found, number)}, {_how_sure(found)}{_left_out(found, name, baseline)}"
+    least = 2.0 ** (1 - found.units)
+    few = f" (too few: p cannot be below {least:.2g})" if least >= _SIGNIFICANT_P and found.units > 1 else ""
+    how_sure = f"{_interval(found, number)}, {_how_sure(found)}{few}{_left_out(found, name, baseline)}"
     return f"{name}: no difference from {baseline} can be told: {size}, {how_sure}"
 
 
@@ -133,13 +135,18 @@ def is_undecided(found: Paired) -> bool:
     low, high = found.difference.low, found.difference.high
     if found.p_holm is None or low is None or high is None or found.better != "neither":
         return False
-    return found.p_holm < _SIGNIFICANT_P or low > 0 or high < 0
+    if found.p_holm < _SIGNIFICANT_P:
+        return True
+    # the mean is certain of a side that no more than half of the logs are on
+    return (low > 0 or high < 0) and 2 * found.with_mean <= found.units
 
 
 def contest_lines(contest: Contest | None, key: str) -> list[str]:
     """Which configurations may be the best."""
     if contest is None:
         return ["The best cannot be named: no two logs have a run of every configuration."]
+    if contest.logs < _FEWEST_LOGS:
+        return [f"The best cannot be named: {count_text(contest.logs, 'log')} that all have are too few."]
     able = [c for c in contest.candidates if c.may_be]
     of = f"over {contest.logs} of {contest.of_logs} logs (those that every configuration has)"
     if len(able) == 1:
@@ -156,7 +163,7 @@ def run_lines(runs: Sequence[OneRun], what: str) -> Iterator[str]:
     """How many there are, and the first of them."""
     if not runs:
         return
-    yield f"{_count(len(runs), 'run')} {what}:"
+    yield f"{count_text(len(runs), 'run')} {what}:"
     for run in runs[:_SHOWN_RUNS]:
         message = run.message.strip().splitlines()[0] if run.message.strip() else ""
         yield f"  {run_name(run)}{f': {message}' if message else ''}"
@@ -167,6 +174,16 @@ def run_lines(runs: Sequence[OneRun], what: str) -> Iterator[str]:
 def run_name(run: OneRun) -> str:
     """Configuration, log and seed."""
     return f"{run.configuration}, {run.log}, seed {run.seed}"
+
+
+def mean_text(number: float, unit: str) -> str:
+    """A mean as papers print it; that of counts is no count."""
+    return f"{number:.2f}" if unit in ("scans", "episodes") else paper_text(number, unit)
+
+
+def count_text(number: int, what: str) -> str:
+    """`1 log`, `2 logs`."""
+    return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 # -------------------------------------------------------------------------------------------- details
@@ -194,7 +211,7 @@ _IN_PAPERS = {
 
 def _spread_cells(found: Distribution) -> list[str]:
     def text(number: float | None) -> str:
-        return MISSING if number is None else paper_text(number, found.unit)
+        return MISSING if number is None else mean_text(number, found.unit)
 
     mean = text(found.mean.value) + (f" ({found.without} without)" if found.without else "")
     low, high = text(found.mean.low), text(found.mean.high)
@@ -203,11 +220,7 @@ def _spread_cells(found: Distribution) -> list[str]:
 
 
 def _mean_cell(found: Distribution | None) -> str:
-    if found is None:
-        return MISSING
-    # a mean of counts is no count
-    is_count = found.unit in ("scans", "episodes")
-    return f"{found.mean.value:.2f}" if is_count else paper_text(found.mean.value, found.unit)
+    return MISSING if found is None else mean_text(found.mean.value, found.unit)
 
 
 def _level_cell(level: Level, summary: Summary, key: str) -> str:
@@ -216,9 +229,7 @@ def _level_cell(level: Level, summary: Summary, key: str) -> str:
         found = difference.found
         if difference.name == summary.name and found is not None:
             certain = "" if found.better == "neither" else "*"
-            change = (
-                f"{found.percent.value:+.0f} %" if found.percent else paper_text(found.difference.value, found.unit)
-            )
+            change = f"{found.percent.value:+.0f} %" if found.percent else mean_text(found.difference.value, found.unit)
             text += f" {change}{certain}"
     if lost := summary.failed + summary.missing:
         text += f" ({summary.done} of {summary.done + lost} runs)"
@@ -230,7 +241,7 @@ def _size(found: Paired, number: Interval) -> str:
     value = abs(number.value)
     if found.percent:
         return f"{_digits(value)} %"
-    return f"{_digits(100 * value)} points" if found.unit == "share" else paper_text(value, found.unit)
+    return f"{_digits(100 * value)} points" if found.unit == "share" else mean_text(value, found.unit)
 
 
 def _interval(found: Paired, number: Interval) -> str:
@@ -243,16 +254,17 @@ def _interval(found: Paired, number: Interval) -> str:
         return f"95 % interval {_digits(low)} to {_digits(high)} %"
     if found.unit == "share":
         return f"95 % interval {_digits(100 * low)} to {_digits(100 * high)} points"
-    return f"95 % interval {paper_text(low, found.unit)} to {paper_text(high, found.unit)}"
+    return f"95 % interval {mean_text(low, found.unit)} to {mean_text(high, found.unit)}"
 
 
 def _digits(number: float) -> str:
     """Two digits that count, no more: 0.34, 3.4, 34."""
-    return f"{number:.0f}" if abs(number) >= 10 else f"{number:.1f}" if abs(number) >= 1 else f"{number:.2g}"
+    rounded = f"{number:.0f}" if abs(number) >= 10 else f"{number:.1f}" if abs(number) >= 1 else f"{number:.2g}"
+    return "0" if not float(rounded) else rounded
 
 
 def _how_sure(found: Paired) -> str:
-    units = _count(found.units, "log") if found.over == "logs" else f"{found.units} seeds of one log"
+    units = count_text(found.units, "log") if found.over == "logs" else f"{found.units} seeds of one log"
     return f"{_p_text(found)}, {units}, better on {found.b_better}"
 
 
@@ -277,13 +289,9 @@ def _middle(found: Paired) -> str:
 
 def _left_out(found: Paired, name: str, baseline: str) -> str:
     sides = ((found.alone_a, baseline), (found.alone_b, name))
-    parts = [f"{_count(count, 'run')} of {who}" for count, who in sides if count]
+    parts = [f"{count_text(count, 'run')} of {who}" for count, who in sides if count]
     return f"; left out for want of a partner: {', '.join(parts)}" if parts else ""
 
 
 def _candidate(candidate: Candidate, unit: str) -> str:
     return f"{candidate.name} ({paper_text(candidate.mean, unit)}, first in {candidate.chance:.0%} of the draws)"
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"

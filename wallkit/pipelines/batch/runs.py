@@ -131,6 +131,35 @@ def with_parts_of_names(runs: Runs, pattern: str) -> Runs:
     return replace(runs, facts={**runs.facts, **read})
 
 
+def where(runs: Runs, words: str) -> Runs:
+    """The runs with one of the values: `people=4,8,12`; logs and configurations without any are gone.
+
+    Raises:
+        WallkitError: it is written otherwise, or no run has such a fact or value.
+    """
+    key, equals, values = words.partition("=")
+    if not equals:
+        raise WallkitError(f"--where '{words}' says no values", hint=f"{words}=A or {words}=A,B")
+    levels, wanted = dict(levels_of(runs, key)), [value.strip() for value in values.split(",")]
+    if unknown := [value for value in wanted if value not in levels]:
+        raise WallkitError(f"--where: no run has {key} = {unknown[0]}", hint=f"one of: {', '.join(levels)}")
+    return _renumbered(runs.chosen(np.any([levels[value] for value in wanted], axis=0)))
+
+
+def _renumbered(runs: Runs) -> Runs:
+    """Without the names that no run has any more."""
+    logs, log = np.unique(runs.log, return_inverse=True)
+    configurations, configuration = np.unique(runs.configuration, return_inverse=True)
+    return replace(
+        runs,
+        logs=tuple(runs.logs[i] for i in logs.tolist()),
+        log=log,
+        configurations=tuple(runs.configurations[i] for i in configurations.tolist()),
+        settings=tuple(runs.settings[i] for i in configurations.tolist()),
+        configuration=configuration,
+    )
+
+
 def levels_of(runs: Runs, key: str) -> list[tuple[str, BoolArray]]:
     """The values of a fact in their order (numbers as numbers), each with its runs (N,).
 
