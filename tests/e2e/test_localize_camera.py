@@ -107,6 +107,44 @@ def test_later_seeds_look_at_no_image_and_say_what_a_first_one_says(world):
     assert second.filtering.by_class == alone.filtering.by_class
 
 
+def test_a_cache_of_segmentations_changes_nothing_but_who_looks(world, tmp_path):
+    """Images are segmented once for all filters, calibrations and clocks; the time that this took is counted every time."""
+    model, words = str(world / "colours.onnx"), (f"segment.cache={tmp_path / 'seen'}",)
+    alone = localize(ready(world, model=model))
+    first = localize(ready(world, model=model, words=words))
+    again = ready(world, model=model, words=words)
+    looked = []
+    again.sight.segment = looked.append
+    second = localize(again)
+    assert not looked
+    for run in (first, second):
+        np.testing.assert_array_equal(run.steps.poses, alone.steps.poses)
+        assert run.filtering.by_class == alone.filtering.by_class
+    assert second.filtering.segment_ms == pytest.approx(first.filtering.segment_ms)
+    assert any("segmented in an earlier run" in line for line in second.filtering.lines())
+    # other filters and a wrong calibration look at the same images
+    turned = (
+        "points.perturb.rotation_deg=2",
+        "points.perturb.rotation_axis=[0,1,0]",
+        "points.perturb.time_offset_ms=20",
+    )
+    other = ready(world, ("soft_mask",), model=model, words=(*words, *turned))
+    assert "errors are put in on purpose: rotation_deg = 2, time_offset_ms = 20" in " ".join(warnings_of(other))
+    localize(other)
+    assert other.sight.cache.kept < 0.4 * other.sight.cache.found
+
+
+def test_shrunken_masks_keep_fewer_returns_and_lost_images_none(world):
+    kept = {
+        word: localize(ready(world, words=(f"points.perturb.{word}",))).filtering
+        for word in ("seed=0", "mask_px=4", "mask_px=-4", "drop_share=0.5")
+    }
+    walls = {word: found.by_class["wall"][1] for word, found in kept.items()}
+    assert walls["mask_px=-4"] < walls["seed=0"] < walls["mask_px=4"]
+    assert kept["mask_px=4"].by_class["person"][0] < kept["seed=0"].by_class["person"][0]
+    assert 0.2 < kept["drop_share=0.5"].without_image / kept["drop_share=0.5"].updates < 0.8
+
+
 def test_only_images_for_updates_are_segmented_and_all_of_them_ahead(world):
     """Ten images a second, an update every 0.2 m: most are never looked at, and none while the filter waits."""
     given = ready(world)

@@ -67,6 +67,18 @@ class Loss:
         self.undecodable[topic] = max(self.undecodable[topic], so_far)
         self.reasons.setdefault(topic, reason)
 
+    def add_all(self, other: Loss) -> None:
+        """Remember what another reading of the same log has lost, once."""
+        for damage in other.damages.values():
+            self.add(damage)
+        for topic, count in other.undecodable.items():
+            self.count_undecodable(topic, count, other.reasons[topic])
+        for topic, reason in other.skipped.items():
+            self.skipped.setdefault(topic, reason)
+        for text in other.notes:
+            self.note(text)
+        self.recovered.update(other.recovered)
+
     def lines(self) -> list[str]:
         """One sentence for each thing that was lost."""
         lines = [str(d) for d in self.damages.values()]

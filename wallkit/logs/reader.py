@@ -93,6 +93,11 @@ class Log:
         """What kinds of file it is made of."""
         return tuple(sorted({f.format for f in self.files}))
 
+    def reopened(self) -> Log:
+        """The same recording, of which nothing was lost yet; compressed files are not unpacked again."""
+        loss = Loss()
+        return Log(self.paths, [_open(unpacked_file, loss) for unpacked_file in self._keep], loss, self._keep)
+
     def channels_of(self, *kinds: str) -> tuple[Channel, ...]:
         """Channels that carry one of the types ("sensor_msgs/LaserScan"), and can be decoded."""
         return tuple(c for c in self.channels if c.kind in kinds and self._decoder(c) is not None)

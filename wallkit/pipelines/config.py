@@ -17,7 +17,7 @@ from wallkit.maps.rules.tolerances import Tolerances
 from wallkit.pipelines.evaluate import EvaluateSettings
 from wallkit.pipelines.recorder import ResultSettings
 from wallkit.points.filters import PointsSettings
-from wallkit.segment.settings import SegmentSettings
+from wallkit.segment.settings import USERS, SegmentSettings
 
 DEFAULT_FILE = Path("wallkit.toml")
 
@@ -72,10 +72,11 @@ def load_config(path: Path | None, words: Sequence[str] = (), flags: dict[str, A
 
 
 def _with_files_beside(source: Source, path: Path) -> Source:
-    """The source with its map and model named from here, not from the file's folder."""
+    """The source with its map, model and cache named from here, not from the file's folder."""
     table = _beside(_beside(source.table, "map", path), "ceiling", path)
     if isinstance(table.get("segment"), dict):
-        table = {**table, "segment": _beside(table["segment"], "model", path)}
+        segment = _beside(table["segment"], "model", path)
+        table = {**table, "segment": segment if segment.get("cache") == USERS else _beside(segment, "cache", path)}
     return replace(source, table=table)
 
 

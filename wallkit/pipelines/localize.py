@@ -14,25 +14,22 @@ from typing import Any
 
 import numpy as np
 
-from wallkit.core.geometry import interpolate_poses
-from wallkit.core.grid import distances_at
 from wallkit.core.steps import Steps
-from wallkit.core.types import Estimate, Float64Array, StampedPose, Trajectory
-from wallkit.errors import ConfigError, LogError, WallkitError
+from wallkit.core.types import Estimate, StampedPose, Trajectory
+from wallkit.errors import ConfigError, WallkitError
 from wallkit.evaluate.resources import Mark, Timers, mark_now
 from wallkit.evaluate.tum import read_tum
 from wallkit.localize.ceiling_filter import CeilingLocalizer, ceiling_localizer
 from wallkit.localize.ekf import ScanMatchingEkf, scan_matching_ekf
 from wallkit.localize.filter import MonteCarloLocalizer, monte_carlo_localizer
-from wallkit.localize.initial import SPREADS
 from wallkit.localize.per_class import PerClass
 from wallkit.logs.loss import Loss
 from wallkit.logs.reader import Log, open_log
 from wallkit.logs.results import ResultWriter
 from wallkit.logs.rig import Rig, Wanted, find_rig
 from wallkit.logs.sync import SyncReport
-from wallkit.logs.topics import pick_initial_pose, pick_truth
-from wallkit.logs.trajectories import first_pose, trajectory_of
+from wallkit.logs.topics import pick_truth
+from wallkit.logs.trajectories import trajectory_of
 from wallkit.pipelines.cameras import CameraRequest
 from wallkit.pipelines.ceiling.camera import CameraWords
 from wallkit.pipelines.config import Config
@@ -40,7 +37,9 @@ from wallkit.pipelines.localize_ceiling import Overhead, alone, checked, find_ov
 from wallkit.pipelines.maps import LoadedMap, load_map
 from wallkit.pipelines.need import UpdatesAhead
 from wallkit.pipelines.recorder import MessageWriter, Recorder
+from wallkit.pipelines.shared import Shared
 from wallkit.pipelines.sight import Sight, sight_of
+from wallkit.pipelines.start import check_on_map, find_start
 from wallkit.pipelines.watch import Filtering, Moment, Watch
 from wallkit.points.filters import WITH_CAMERA, apply_filters
 from wallkit.points.labels import labelled_scan
@@ -85,6 +84,7 @@ class Prepared:
 
     Attributes:
         sight: the cameras; None without. fallen_back: why they are not used although they were asked for.
+        shared: what runs over the same log need only once; None: this run reads the log itself.
     """
 
     request: Request
@@ -98,6 +98,7 @@ class Prepared:
     sight: Sight | None = None
     fallen_back: str = ""
     overhead: Overhead | None = None
+    shared: Shared | None = None
 
 
 @dataclass(frozen=True)
@@ -127,20 +128,19 @@ class Run:
 
 Observer = Callable[[int], None]
 
-# how well a start pose taken from truth is known: as well as the truth itself
-TRUTH_SD = (0.1, 0.1, np.deg2rad(3.0))
 
-
-def prepare(request: Request, config: Config, *, seeds: int = 1) -> Prepared:
+def prepare(request: Request, config: Config, *, seeds: int = 1, shared: Shared | None = None) -> Prepared:
     """Open the log and the map, and find what is needed in them.
 
     Args:
-        seeds: how many runs there will be: images are segmented for the first only.
+        seeds: how many runs there will be: the log is read, and images are segmented, for the first only.
+        shared: of other runs, with other settings, over the same log: it is read for the first of them only.
 
     Raises:
         WallkitError: something is missing; nothing has been computed or written yet.
     """
-    log = open_log(request.logs)
+    shared = shared or (Shared() if seeds > 1 else None)
+    log = shared.log(request.logs) if shared else open_log(request.logs)
     map_path = request.map or (Path(config.map) if config.map else None)
     overhead = find_overhead(log, request.ceiling, request.camera, config, has_map=map_path is not None)
     if overhead is not None and overhead.is_alone:
@@ -154,10 +154,10 @@ def prepare(request: Request, config: Config, *, seeds: int = 1) -> Prepared:
     loaded = checked(loaded, overhead)
     truth = _find_truth(log, request.truth)
     window = _window_ns(log, rig, request)
-    start = _find_start(log, request, truth, rig, window)
+    start = find_start(log, request.init, truth, rig, window)
     if isinstance(start, StampedPose):
-        _check_on_map(start.pose, loaded)
-    return Prepared(request, config, log, rig, loaded, truth, start, window, sight, fallen_back, overhead)
+        check_on_map(start.pose, loaded)
+    return Prepared(request, config, log, rig, loaded, truth, start, window, sight, fallen_back, overhead, shared)
 
 
 def localize(
@@ -183,7 +183,7 @@ def localize(
     belief: Any = tracker.start(rng, p.start)  # type: ignore[arg-type]  # _tracker refuses a spread for the EKF
     sync, recorder = SyncReport(), Recorder()
     watch = Watch(p.config.points, p.sight, moments)
-    frames, views = frames_and_views(p.log, p.rig, p.overhead, p.config, sync, p.window_ns)
+    frames, views = frames_and_views(p.log, p.rig, p.overhead, p.config, sync, p.window_ns, p.shared)
     ahead = UpdatesAhead(p.config.localize)
     looked = p.sight.ahead(frames, ahead) if p.sight else ((frame, ()) for frame in frames)
     with _message_writer(p, result_mcap) as messages:
@@ -285,63 +285,3 @@ def _window_ns(log: Log, rig: Rig, request: Request) -> tuple[int | None, int | 
         return None, None
     first = log.first(rig.scan.topic)[0].stamp_ns
     return tuple(None if s is None else first + round(s * 1e9) for s in (request.start_s, request.end_s))  # type: ignore[return-value]
-
-
-def _find_start(
-    log: Log, request: Request, truth: Trajectory | None, rig: Rig, window_ns: tuple[int | None, int | None]
-) -> StampedPose | str:
-    """The start as a pose, or the name of a spread over the map."""
-    init = request.init
-    if init in SPREADS:
-        return init
-    if init == "truth":
-        return _start_from_truth(log, truth, rig, window_ns)
-    if init is None or init == "topic":
-        channel = pick_initial_pose(log)
-        if channel is not None:
-            return first_pose(log, channel)
-        if init == "topic":
-            raise LogError("no initial pose topic", where=log.name, hint="--init X,Y,YAW, or global")
-        return "global"
-    return StampedPose(0, "map", _pose_from_words(init))
-
-
-def _start_from_truth(
-    log: Log, truth: Trajectory | None, rig: Rig, window_ns: tuple[int | None, int | None]
-) -> StampedPose:
-    if truth is None:
-        raise LogError(
-            "--init truth needs a truth, and the log has none", where=log.name, hint="--truth TOPIC or FILE.tum"
-        )
-    stamp_ns = window_ns[0] if window_ns[0] is not None else log.first(rig.scan.topic)[0].stamp_ns
-    if not truth.stamps_ns[0] - 10**9 <= stamp_ns <= truth.stamps_ns[-1]:
-        raise LogError("the truth does not reach the first scan", where=log.name, hint="start later with --start")
-    pose = interpolate_poses(truth.stamps_ns, truth.poses, [stamp_ns])[0]
-    return StampedPose(stamp_ns, "map", pose, np.diag(np.square(TRUTH_SD)))
-
-
-def _check_on_map(pose: Float64Array, loaded: LoadedMap) -> None:
-    """Refuse a start that the map does not reach: the filter would believe it and then be lost for no visible reason."""
-    if not np.isfinite(distances_at(loaded.fields, pose[None, :2])[0]):
-        height, width = loaded.fields.shape
-        corner = loaded.fields.origin
-        raise ConfigError(
-            f"the start x {pose[0]:.2f} m, y {pose[1]:.2f} m lies outside the map",
-            where="--init",
-            hint=f"the map has its corner at {corner[0]:.2f}, {corner[1]:.2f} and is "
-            f"{width * loaded.fields.resolution_m:.1f} x {height * loaded.fields.resolution_m:.1f} m",
-        )
-
-
-def _pose_from_words(words: str) -> Float64Array:
-    parts = words.split(",")
-    try:
-        pose = np.array([float(part) for part in parts])
-    except ValueError:
-        pose = np.zeros(0)
-    if pose.shape != (3,) or not np.isfinite(pose).all():
-        names = ", ".join(["topic", "truth", *SPREADS])
-        raise ConfigError(
-            f"'{words}' is no start", where="--init", hint=f"X,Y,YAW in metres and radians, or one of {names}"
-        )
-    return pose

@@ -28,6 +28,7 @@ from wallkit.maps.grids.fields import MapsSettings
 from wallkit.pipelines.ceiling.camera import CameraWords, UpCamera, find_up_camera, is_grey, sights_of
 from wallkit.pipelines.config import Config
 from wallkit.pipelines.maps import LoadedMap, load_map
+from wallkit.pipelines.shared import Shared
 
 Window = tuple[int | None, int | None]
 # below this share of the map's free space under the ceiling people should know
@@ -173,13 +174,24 @@ class Views:
 
 
 def frames_and_views(
-    log: Log, rig: Rig, overhead: Overhead | None, config: Config, report: SyncReport, window_ns: Window
+    log: Log,
+    rig: Rig,
+    overhead: Overhead | None,
+    config: Config,
+    report: SyncReport,
+    window_ns: Window,
+    shared: Shared | None = None,
 ) -> tuple[Iterator[Frame], Views]:
-    """Scans, and the views of the ceiling at a rate of their own; without a LiDAR every view is a frame."""
+    """Scans, and the views of the ceiling at a rate of their own; without a LiDAR every view is a frame.
+
+    Args:
+        shared: holds the scans of runs before.
+    """
     if overhead is not None and overhead.is_alone:
         frames, views = tee(overhead.sights(log, config, window_ns, report))
         return (frame_of(sight, overhead.ceiling.height_m) for sight in frames), Views(views)
-    scans = synchronise(log, rig, config.logs, report=report, start_ns=window_ns[0], end_ns=window_ns[1])
+    read = shared.frames if shared else synchronise
+    scans = read(log, rig, config.logs, report=report, start_ns=window_ns[0], end_ns=window_ns[1])
     return scans, Views(iter(()) if overhead is None else overhead.sights(log, config, window_ns))
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from wallkit.core.geometry import invert_matrix
-from wallkit.core.segmentation import Segmentation, Segmenter
+from wallkit.core.segmentation import Segmentation
 from wallkit.core.types import BeamLabels, CameraImage, Float64Array, Frame, Int64Array, UInt8Array, View
 from wallkit.errors import LogError, ModelError
 from wallkit.logs.images import pixels_from_image
@@ -27,8 +27,11 @@ from wallkit.pipelines.cameras import (
 from wallkit.points.filters import PointsSettings
 from wallkit.points.look import ClassesAt, Look, LookSettings, look, project_frame
 from wallkit.points.outlines import classes_by_outlines
+from wallkit.points.perturb import PerturbSettings, perturbed, without_dropped
 from wallkit.segment.ahead import Seen, look_ahead
+from wallkit.segment.cache import SegmentationCache, cache_of
 from wallkit.segment.default import DEFAULT
+from wallkit.segment.grown import grown
 
 if TYPE_CHECKING:
     from wallkit.segment.settings import SegmentSettings
@@ -76,6 +79,7 @@ class Sight:
         T_lidar_base: (4, 4). kept: classes of which something must be seen. may_fall_back: see CameraRequest.
         holds_scans: whether labels are kept for the next seed; their cost is then counted again.
         rate_hz: images of each camera that are looked at in a second at most; 0: all that are needed.
+        cache: segmentations of earlier runs; their cost is counted again. perturb: errors put in after that.
     """
 
     cameras: tuple[Camera, ...]
@@ -89,9 +93,11 @@ class Sight:
     holds_scans: bool = False
     log_name: str = ""
     rate_hz: float = 0.0
+    cache: SegmentationCache | None = None
+    perturb: PerturbSettings = PerturbSettings()
     classes: tuple[str, ...] = field(init=False)
     _class_of: Int64Array = field(init=False)
-    _costs_ms: dict[tuple[str, int], float] = field(default_factory=dict)
+    _costs_ms: dict[tuple[str, int], tuple[float, float]] = field(default_factory=dict)
     _scans: dict[int, Labelled] = field(default_factory=dict)
     _asked: int = 0
     _without_image: int = 0
@@ -104,10 +110,12 @@ class Sight:
     def ahead(self, frames: Iterable[Frame], is_needed: Callable[[Frame], bool]) -> Iterator[tuple[Frame, Sights]]:
         """Each frame with what its images show, segmented in another thread while the filter works on those before."""
 
+        kept = (without_dropped(frame, self.perturb) for frame in frames)
+
         def is_new(frame: Frame) -> bool:
             return is_needed(frame) and frame.stamp_ns not in self._scans
 
-        return look_ahead(frames, self._looked, rate_hz=self.rate_hz, is_needed=is_new)
+        return look_ahead(kept, self._looked, rate_hz=self.rate_hz, is_needed=is_new)
 
     def labels_of(self, frame: Frame, sights: Sights = ()) -> Labelled:
         """What the cameras say about a frame's returns.
@@ -130,8 +138,8 @@ class Sight:
             if segmentation is None and not self.rate_hz:
                 segmentation = self._looked(view.image)
             # an image that the scan before had too has cost nothing more
-            spent_ms = self._costs_ms.pop((view.image.frame_id, view.image.stamp_ns), 0.0)
-            cost_ms, owed_ms = cost_ms + spent_ms, owed_ms + (spent_ms if was_ahead else 0.0)
+            spent_ms, here_ms = self._costs_ms.pop((view.image.frame_id, view.image.stamp_ns), (0.0, 0.0))
+            cost_ms, owed_ms = cost_ms + spent_ms, owed_ms + spent_ms - (0.0 if was_ahead else here_ms)
             if segmentation is None:
                 continue
             located = project_frame(camera.calibration, frame, view, self.T_lidar_base, self.settings)
@@ -146,12 +154,22 @@ class Sight:
     def _looked(self, image: CameraImage) -> Segmentation | None:
         """The image's segmentation, its cost remembered; None where it cannot be read."""
         began = time.perf_counter_ns()
+        found, cost_ms = (None, 0.0) if self.cache is None else self.cache.find(image) or (None, 0.0)
+        if found is None:
+            found = self._segmented(image)
+            cost_ms = (time.perf_counter_ns() - began) / 1e6
+            if self.cache is not None and found is not None:
+                self.cache.keep(image, found, cost_ms)
+        if found is not None and self.perturb.mask_px:
+            found = grown(found, self.perturb.mask_classes, self.perturb.mask_px)
+        self._costs_ms[image.frame_id, image.stamp_ns] = cost_ms, (time.perf_counter_ns() - began) / 1e6
+        return found
+
+    def _segmented(self, image: CameraImage) -> Segmentation | None:
         try:
             return self.segment(image)
         except LogError:
             return None
-        finally:
-            self._costs_ms[image.frame_id, image.stamp_ns] = (time.perf_counter_ns() - began) / 1e6
 
     def _classes_at(self, segmentation: Segmentation) -> ClassesAt:
         if self.settings.lookup == "pixels":
@@ -196,7 +214,8 @@ def sight_of(
     model = request.model or segment.model or DEFAULT
     is_oracle = model == ORACLE_MODEL
     cameras = find_cameras(log, request, is_oracle=is_oracle, lidar_frame=rig.lidar_frame)
-    looks, names, roles = _oracle(log, segment) if is_oracle else _network(model, segment)
+    cameras = tuple(_perturbed(camera, points.perturb) for camera in cameras)
+    looks, names, roles, cache = _oracle(log, segment) if is_oracle else _network(model, segment)
     kept = _kept(points)
     if kept and not set(kept) & set(roles):
         listed = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
@@ -216,6 +235,8 @@ def sight_of(
         holds_scans=holds_scans,
         log_name=log.name,
         rate_hz=segment.rate_hz,
+        cache=cache,
+        perturb=points.perturb,
     )
 
 
@@ -225,7 +246,7 @@ def picture_of(image: CameraImage) -> UInt8Array:
     return pixels if pixels.ndim == 3 else np.repeat(pixels[..., None], 3, axis=2)
 
 
-Looks = tuple[Callable[[CameraImage], Segmentation], tuple[str, ...], tuple[str, ...]]
+Looks = tuple[Callable[[CameraImage], Segmentation], tuple[str, ...], tuple[str, ...], SegmentationCache | None]
 
 
 def _oracle(log: Log, settings: SegmentSettings) -> Looks:
@@ -238,7 +259,8 @@ def _oracle(log: Log, settings: SegmentSettings) -> Looks:
     def segment(image: CameraImage) -> Segmentation:
         return class_map(ids_from_png(image), names, settings.roles, nothing=NO_CLASS)
 
-    return segment, names, settings.roles.of(names)
+    # no cache: the log holds the segmentations already
+    return segment, names, settings.roles.of(names), None
 
 
 def _network(model: str, settings: SegmentSettings) -> Looks:
@@ -246,12 +268,20 @@ def _network(model: str, settings: SegmentSettings) -> Looks:
 
     from wallkit.segment.onnx_segmenter import load_segmenter
 
-    segmenter: Segmenter = load_segmenter(Path(model), settings)
+    segmenter = load_segmenter(Path(model), settings)
 
     def segment(image: CameraImage) -> Segmentation:
         return segmenter.segment(pixels_from_image(image))
 
-    return segment, segmenter.names, segmenter.roles
+    return segment, segmenter.names, segmenter.roles, cache_of(segmenter, settings.cache)
+
+
+def _perturbed(camera: Camera, settings: PerturbSettings) -> Camera:
+    """The camera with errors put in, and a note that says so."""
+    if not settings.said:
+        return camera
+    note = f"{camera.source}: errors are put in on purpose: {', '.join(settings.said)} (points.perturb)"
+    return replace(camera, calibration=perturbed(camera.calibration, settings), notes=(*camera.notes, note))
 
 
 def _kept(points: PointsSettings) -> tuple[str, ...]:

@@ -29,6 +29,7 @@ class Filtering:
         returns, kept: over all updates. by_class: class -> (returns, kept).
         images: looked at for updates. without_image: updates that no image belonged to.
         segment_ms: mean of decoding and segmenting per update; None without a camera.
+        notes: what else a reader of the numbers should know, a sentence each.
     """
 
     filters: tuple[str, ...]
@@ -43,6 +44,7 @@ class Filtering:
     images: int
     without_image: int
     segment_ms: float | None
+    notes: tuple[str, ...] = ()
 
     @property
     def unseen(self) -> int:
@@ -83,7 +85,7 @@ class Filtering:
             found.append(f"the kept returns hold one direction only at {self.one_sided} of {self.updates} updates")
         if self.without_image:
             found.append(f"{self.without_image} of {self.updates} updates had no image")
-        return found
+        return [*found, *self.notes]
 
     def document(self) -> dict[str, Any]:
         """For run.json."""
@@ -173,6 +175,7 @@ class Watch:
             self._images,
             self._without_image,
             self._cost_ms / max(self._updates, 1) if self._sight else None,
+            tuple(self._sight.cache.lines()) if self._sight and self._sight.cache else (),
         )
 
     def moments(self) -> tuple[Moment, ...]:

@@ -20,6 +20,7 @@ from wallkit.points.kept import KeptSettings
 from wallkit.points.line_fit import LineFit
 from wallkit.points.look import LookSettings
 from wallkit.points.mask_filters import RejectDynamic, SoftMask, WallMask
+from wallkit.points.perturb import PerturbSettings
 
 
 class PointFilter(Protocol):
@@ -94,6 +95,7 @@ class PointsSettings:
     line_fit: LineFit = section(LineFit, "only returns on long straight lines")
     novelty: Novelty = section(Novelty, "returns in front of the map")
     look: LookSettings = section(LookSettings, "where in an image a return may have landed")
+    perturb: PerturbSettings = section(PerturbSettings, "errors put in on purpose, to study what breaks the filters")
     kept: KeptSettings = section(KeptSettings, "when what the filters leave is too little")
 
     def __post_init__(self) -> None:

@@ -43,6 +43,9 @@ class LookSettings:
     time_sigma_s: float = setting(0.002, "sigma of the time offset where the calibration does not say its own", low=0)
     moving_m_s: float = setting(0.5, "what moves by itself may have moved so fast between beam and image", low=0)
     margin_max_px: float = setting(40.0, "no point's margin is larger", low=0)
+    field_of_view_deg: float = setting(
+        0.0, "returns farther to the side than half of it count as not seen; 0: the whole image", low=0, high=360
+    )
     hidden_px: float = setting(6.0, "3-D clouds: points so near in the image are on one line of sight", low=0.5)
     hidden_m: float = setting(0.15, "3-D clouds: a point so much nearer hides the one behind it", low=0)
     hidden_per_m: float = setting(0.05, "3-D clouds: and so much more per metre of depth", low=0)
@@ -78,7 +81,7 @@ def project_frame(
     assert calibration.T_camera_lidar is not None  # check_usable
     T = calibration.T_camera_lidar @ T_lidar_base @ matrix_from_pose(relative(view.odometry, frame.odometry))
     projection = Projection(*project_points(calibration.camera, T, frame.points.xyz_m))
-    is_seen = projection.is_inside
+    is_seen = projection.is_inside & _in_view(T, frame.points.xyz_m, settings.field_of_view_deg)
     if frame.cloud_m is not None:
         cloud = Projection(*project_points(calibration.camera, T, frame.cloud_m))
         near = {"margin_m": settings.hidden_m, "margin_per_m": settings.hidden_per_m}
@@ -107,6 +110,14 @@ def look(
         found, sure = classes_at(places.reshape(-1, 2))
         _share_out(found, sure, class_of, seen, samples, _MIDDLE, labels, confidences, shares)
     return Look(projection, is_seen, margins, labels, confidences, shares)
+
+
+def _in_view(T: Float64Array, xyz_m: Float32Array, field_of_view_deg: float) -> BoolArray:
+    """(K,) points (K, 3), which T (4, 4) moves to the camera, that are not too far to its side."""
+    if field_of_view_deg == 0:
+        return np.ones(len(xyz_m), dtype=np.bool_)
+    x, z = (xyz_m @ T[row, :3] + T[row, 3] for row in (0, 2))
+    return np.asarray(np.abs(np.arctan2(x, z)) <= np.deg2rad(field_of_view_deg) / 2)
 
 
 def _margins_px(

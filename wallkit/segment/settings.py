@@ -8,6 +8,9 @@ from wallkit.core.config import section, setting
 from wallkit.errors import ConfigError
 from wallkit.segment.roles import Roles
 
+# what `segment.cache` says for the user's own folder
+USERS = "user"
+
 
 @dataclass(frozen=True)
 class SegmentSettings:
@@ -21,6 +24,10 @@ class SegmentSettings:
     threads: int = setting(1, "threads of the network", low=1)
     spinning: bool = setting(False, "threads wait busily: faster on idle cores, twice as slow on busy ones")
     rate_hz: float = setting(0.0, "images segmented in a second at most; 0: all", low=0)
+    cache: str = setting(
+        "",
+        'folder where segmentations are kept for later runs, relative to this file; "user": the user\'s; none if empty',
+    )
     names: tuple[str, ...] = setting((), "names of the classes, for a model whose metadata has none")
     mean: tuple[float, float, float] = setting(
         (0.0, 0.0, 0.0), "subtracted from R, G, B in [0, 1], for a model whose metadata does not say"
