@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from wallkit.core.results import Value
 from wallkit.evaluate.over_logs import compare_pairs, corrected, distribution, holm
@@ -42,7 +43,9 @@ def test_the_interval_of_the_mean_is_over_logs():
         found = distribution(rng, ERROR, np.repeat(of_log, seeds), np.repeat(np.arange(LOGS), seeds), resamples=4000)
         widths.append(found.mean.high - found.mean.low)
     assert widths[0] == pytest.approx(widths[1], rel=0.06)
-    assert widths[0] == pytest.approx(2 * 1.96 * of_log.std() / np.sqrt(LOGS), rel=0.06)
+    # Student's interval of the mean
+    half = stats.t.ppf(0.975, LOGS - 1) * of_log.std(ddof=1) / np.sqrt(LOGS)
+    assert widths[0] == pytest.approx(2 * half, rel=0.06)
 
 
 def test_the_worst_of_what_should_be_high_is_the_lowest():

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -13,6 +14,7 @@ from wallkit.pipelines.batch.compare import Question, compare_batch
 from wallkit.pipelines.batch.gather import gather
 from wallkit.pipelines.batch.labels import labels_of_runs
 from wallkit.pipelines.batch.runs import DONE, FAILED, MISSING, levels_of, natural, where, with_parts_of_names
+from wallkit.report import batch_tables as tables
 from wallkit.report import batch_words as words
 
 EACH = len(PLACES) * len(PEOPLE) * len(TAKES) * len(SEEDS)
@@ -61,7 +63,7 @@ def test_every_run_is_counted_whatever_became_of_it():
         *(f"  {n}: no scans on /scan" for n in ("basic, lab-0-1, seed 1", "soft, lab-12-2, seed 0")),
     ]
     assert [(r.log, r.seed) for r in data.missing] == [("hall-0-1", s) for s in SEEDS]
-    assert words.error_table(data)[1][1][:4] == ["soft", str(EACH - 4), "1", "3"]
+    assert tables.error_table(data)[1][1][:4] == ["soft", str(EACH - 4), "1", "3"]
 
 
 def test_a_factor_read_from_the_names_shows_where_it_helps():
@@ -79,7 +81,7 @@ def test_a_factor_read_from_the_names_shows_where_it_helps():
     assert "too few" not in words.star_line(data)
     # the tag of the manifest is the same factor
     assert [level.summaries[0].done for level in crowd.levels] == [18, 18, 18]
-    headers, rows = words.factor_table(people, "error_mean_m")
+    headers, rows = tables.factor_table(people, "error_mean_m")
     assert headers == ["people =", "0 (6 logs)", "2 (6 logs)", "12 (6 logs)"]
     assert [cell.endswith("%*") for cell in rows[1][1:]] == [False, True, True]
 
@@ -176,5 +178,15 @@ def test_folders_of_result_folders_are_read_as_a_batch(folders):
     (soft,) = as_json["differences"]["error_mean_m"]
     assert (soft["name"], soft["found"]["units"], soft["found"]["better"]) == ("soft", 18, "b")
     assert len(as_json["factors"][0]["levels"]) == 18
+    done = CliRunner().invoke(
+        main, ["report", "basic", "soft", "--names", "{a}-{people}-{b}", "--by", "people", "-o", "r.html"]
+    )
+    assert done.exit_code == 0, done.output
+    page = Path("r.html").read_text(encoding="utf-8")
+    assert "Better than basic: soft" in page
+    assert 'href="basic/' in page
+    assert "soft, hall-0-1, seed 1" in page
+    for bad in (["report", "basic", "soft"], ["compare", "basic", "soft", "--by", "log", "--truth", "t.tum"]):
+        assert CliRunner().invoke(main, bad).exit_code == 2
     bad = CliRunner().invoke(main, ["compare", "basic", "soft/hall-0-1", "--by", "people"])
     assert (bad.exit_code, "--by is for" in bad.output) == (2, True)

@@ -90,7 +90,7 @@ def compare(
     from dataclasses import asdict
 
     if read_batch.is_for(runs, {**flags, "paper": paper}):
-        read_batch.compare(runs, _names(runs), flags, is_paper=paper, as_json=as_json)
+        read_batch.compare(runs, _names(runs), {**flags, "truth": truth}, out=out, is_paper=paper, as_json=as_json)
         return
     from wallkit.pipelines.report import COMPARED, COMPARED_IN_PAPERS, compare_runs, write_compare_report
     from wallkit.report.compare import compare_rows, difference_rows
@@ -133,21 +133,30 @@ def compare(
     metavar="FILE.gif",
     help="Its particles at a few moments, and no page.",
 )
+@read_batch.batch_options
 @common.config_option
 @common.set_option
 @common.seed_option
+@common.quiet_option
 def report(runs: tuple[Path, ...], truth: Path | None, out: Path | None, animate: Path | None, **flags: Any) -> None:
-    """Draw the page of a run again, or one page of several, or how its particles gather.
+    """Draw the page of a run again, or one page of several, or of many logs, or how its particles gather.
+
+    Folders of result folders, one for each configuration, make the page of many logs: what differs, the worst runs, and
+    where on the map they fail.
 
     \b
     Examples:
       wallkit report log.wallkit --truth mocap.tum -o with-truth.html
       wallkit report a/ b/ --out report.html
+      wallkit report basic/ wall_mask/ --names "{scene}-{people}-{take}" --by people -o report.html
       wallkit report log.wallkit --animate cloud.gif
     """
     from wallkit.pipelines.report import compare_runs, write_compare_report, write_run_report
 
     settings = _settings(flags["config_path"], flags["words"], None)
+    if animate is None and read_batch.is_for(runs, {**flags, "paper": True}):
+        read_batch.report(runs, _names(runs), {**flags, "truth": truth}, out=out, settings=settings)
+        return
     if animate is not None:
         from wallkit.pipelines.animate import write_animation
 

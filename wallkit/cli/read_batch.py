@@ -1,4 +1,4 @@
-"""`wallkit compare` of many logs: what every configuration is worth over all logs, in tables and sentences."""
+"""`wallkit compare` and `report` of many logs: what every configuration is worth, in sentences, tables and a page."""
 
 from __future__ import annotations
 
@@ -12,9 +12,14 @@ import click
 from wallkit.cli import common
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from wallkit.pipelines.batch.compare import Question
+    from wallkit.pipelines.batch.runs import Runs
+    from wallkit.pipelines.evaluate import EvaluateSettings
     from wallkit.report.batch import BatchData
-    from wallkit.report.batch_words import Table
+    from wallkit.report.batch_map import Places
+    from wallkit.report.batch_tables import Table
 
 batch_options = common.options(
     click.option("--baseline", metavar="NAME", help="Many logs: what the others are compared with; else the first."),
@@ -39,50 +44,87 @@ def is_for(runs: tuple[Path, ...], flags: dict[str, Any]) -> bool:
     return bool((asked or flags["paper"]) and not others)
 
 
-def compare(runs: tuple[Path, ...], names: list[str], flags: dict[str, Any], *, is_paper: bool, as_json: bool) -> None:
-    """Say it, or emit it."""
-    data = read(runs, names, flags, is_paper=is_paper)
+def compare(
+    runs: tuple[Path, ...],
+    names: list[str],
+    flags: dict[str, Any],
+    *,
+    out: Path | None,
+    is_paper: bool,
+    as_json: bool,
+) -> None:
+    """Say it, or emit it; with `out` a page without maps as well."""
+    found = read(runs, names, flags)
+    data = judged(found, names, flags, is_paper=is_paper)
     if as_json:
         common.emit(document(data))
     else:
         say(data, is_paper=is_paper)
+    if out is not None:
+        _write(out, data, ())
+        click.echo(f"report   {out}", err=as_json)
 
 
-def read(runs: tuple[Path, ...], names: list[str], flags: dict[str, Any], *, is_paper: bool) -> BatchData:
-    """The runs, compared as the flags say."""
-    from wallkit.pipelines.batch.compare import compare_batch
+def report(
+    runs: tuple[Path, ...], names: list[str], flags: dict[str, Any], *, out: Path | None, settings: EvaluateSettings
+) -> None:
+    """The page, with the places on the map where runs fail."""
+    from wallkit.pipelines.batch.places import read_places
+
+    if out is None:
+        raise click.UsageError("many logs make a page of their own: say where with --out report.html")
+    found = read(runs, names, flags)
+    data = judged(found, names, flags, is_paper=False)
+    with common.progress("runs", int(found.is_done.sum()), quiet=flags["quiet"]) as tick:
+        places = read_places(found, settings, tick=tick)
+    _write(out, data, places)
+    click.echo(f"report   {out}")
+
+
+def read(runs: tuple[Path, ...], names: list[str], flags: dict[str, Any]) -> Runs:
+    """Those of the runs that the flags ask for."""
     from wallkit.pipelines.batch.folders import read_folders
     from wallkit.pipelines.batch.runs import where, with_parts_of_names
 
+    if flags["truth"] is not None:
+        raise click.UsageError("--truth is of one log; many logs have their truths from wallkit localize --truth")
     found = read_folders(runs, names)
     if flags["names"]:
         found = with_parts_of_names(found, flags["names"])
     for words in flags["where"]:
         found = where(found, words)
-    return compare_batch(found, _question(flags, is_paper=is_paper), title=" against ".join(names))
+    return found
+
+
+def judged(runs: Runs, names: list[str], flags: dict[str, Any], *, is_paper: bool) -> BatchData:
+    """What the runs say about the configurations."""
+    from wallkit.pipelines.batch.compare import compare_batch
+
+    return compare_batch(runs, _question(flags, is_paper=is_paper), title=" against ".join(names))
 
 
 def say(data: BatchData, *, is_paper: bool) -> None:
     """Tables and sentences on stdout."""
+    from wallkit.report import batch_tables as tables
     from wallkit.report import batch_words as words
 
     if is_paper:
-        click.echo(_text(words.paper_table(data.summaries)))
+        click.echo(_text(tables.paper_table(data.summaries)))
     else:
-        click.echo(_text(words.error_table(data)))
+        click.echo(_text(tables.error_table(data)))
         click.echo()
-        click.echo(_text(words.other_table(data)))
+        click.echo(_text(tables.other_table(data)))
     for line in _sentences(data):
         click.echo(line)
     for factor in data.factors:
         click.echo()
         for key in data.differences:
             click.echo(f"mean {words.word_of(key)} by {factor.key}")
-            click.echo(_text(words.factor_table(factor, key)))
+            click.echo(_text(tables.factor_table(factor, key)))
         if is_paper:
             for level in factor.levels:
                 click.echo(f"\n{factor.key} = {level.name}, {words.count_text(level.logs, 'log')}")
-                click.echo(_text(words.paper_table(level.summaries)))
+                click.echo(_text(tables.paper_table(level.summaries)))
     if data.factors and len(data.summaries) > 1:
         click.echo(words.star_line(data))
 
@@ -107,7 +149,7 @@ def _sentences(data: BatchData) -> Iterator[str]:
         if differences:
             yield ""
             yield words.tested_line(key, data.baseline, len(differences))
-            yield from (words.difference_line(d, key, data.baseline) for d in differences)
+            yield from words.difference_lines(differences, key, data.baseline)
     if len(data.summaries) > 1 and data.contest is not None:
         yield ""
         yield from words.contest_lines(data.contest, data.key)
@@ -115,6 +157,20 @@ def _sentences(data: BatchData) -> Iterator[str]:
         if runs:
             yield ""
             yield from words.run_lines(runs, what)
+
+
+def _write(out: Path, data: BatchData, places: Sequence[Places]) -> None:
+    import os
+
+    from wallkit.report.batch_page import write_batch_page
+
+    def link_to(folder: str) -> str:
+        """The page of a run, else its folder, as seen from ours."""
+        page = Path(folder) / "report.html"
+        found = page if page.is_file() else Path(folder)
+        return Path(os.path.relpath(found, out.parent)).as_posix() if found.exists() else ""
+
+    write_batch_page(out, data, places, link_to=link_to)
 
 
 def _text(table: Table) -> str:

@@ -7,10 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from wallkit.core.types import BoolArray, Float64Array, Int64Array
+from wallkit.evaluate.over_logs import small_sample_z
 from wallkit.evaluate.statistics import SIGNIFICANT_P
 
 # with five, no signed-rank test reaches p = 0.05 either
 FEWEST_LOGS = 6
+_NO_NOISE = 1e-24
+_Z = 1.959964
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +35,7 @@ class Best:
 
 
 def find_best(rng: np.random.Generator, losses: Float64Array, *, resamples: int = 2000) -> Best:
-    """The model confidence set of Hansen, Lunde & Nason (2011), with the statistic T_max and logs drawn again.
+    """The model confidence set of Hansen, Lunde & Nason (2011), with the statistic T_R and logs drawn again.
 
     Testing all against the winner would forget that the winner was chosen by its luck on these logs. Here the worst is
     thrown out while the remaining ones differ, so nothing is compared with a winner.
@@ -44,19 +47,31 @@ def find_best(rng: np.random.Generator, losses: Float64Array, *, resamples: int 
     """
     logs, count = losses.shape
     drawn = rng.multinomial(logs, np.full(logs, 1 / logs), size=resamples) @ losses / logs
-    centred, means = drawn - losses.mean(axis=0), losses.mean(axis=0)
+    means, centred = losses.mean(axis=0), drawn - losses.mean(axis=0)
     p_values, alive, so_far = np.ones(count), np.arange(count), 0.0
+    covariance = np.atleast_2d(np.cov(centred, rowvar=False))
+    own = np.diag(covariance)
+    # configurations that give the very same numbers have neither difference nor noise
+    sd = np.sqrt(np.maximum(own[:, None] + own[None, :] - 2 * covariance, _NO_NOISE))
+    # drawn again, few logs vary less than logs do
+    scale = -small_sample_z(max(logs, FEWEST_LOGS)) / _Z
     while len(alive) > 1 and logs >= FEWEST_LOGS:
-        excess = means[alive] - means[alive].mean()
-        noise = centred[:, alive] - centred[:, alive].mean(axis=1, keepdims=True)
-        # configurations that give the very same numbers have neither excess nor noise
-        sd = np.maximum(noise.std(axis=0), 1e-12)
-        worst = int(np.argmax(excess / sd))
-        so_far = max(so_far, float(np.mean((noise / sd).max(axis=1) >= (excess / sd)[worst] - 1e-9)))
+        excess = (means[alive, None] - means[None, alive]) / sd[np.ix_(alive, alive)]
+        worst = int(np.argmax(excess.max(axis=1)))
+        noise = _largest(centred[:, alive], sd[np.ix_(alive, alive)])
+        so_far = max(so_far, float(np.mean(scale * noise >= excess.max() - 1e-9)))
         p_values[alive[worst]] = so_far
         alive = np.delete(alive, worst)
     is_lowest = np.isclose(drawn, drawn.min(axis=1, keepdims=True), rtol=1e-12, atol=0)
     return Best(p_values, np.asarray((is_lowest / is_lowest.sum(axis=1, keepdims=True)).mean(axis=0)))
+
+
+def _largest(centred: Float64Array, sd: Float64Array) -> Float64Array:
+    """(R,) the largest difference of any two configurations (R, M), in their own standard deviations (M, M)."""
+    found = np.zeros(len(centred))
+    for i in range(1, centred.shape[1]):
+        np.maximum(found, np.abs((centred[:, :i] - centred[:, i : i + 1]) / sd[i, :i]).max(axis=1), out=found)
+    return found
 
 
 def find_front(costs: Float64Array, losses: Float64Array) -> Int64Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from wallkit.core.results import Distribution, Paired
+from wallkit.core.results import Distribution, Interval, Paired
 
 
 @dataclass(frozen=True)
@@ -87,6 +87,30 @@ class Contest:
 
 
 @dataclass(frozen=True)
+class Trade:
+    """What a configuration costs and what it gives; on the front no other is better in both."""
+
+    name: str
+    cost: float
+    loss: float
+    is_front: bool
+
+
+@dataclass(frozen=True)
+class Effect:
+    """What one swept setting does, over all values of the others.
+
+    Attributes:
+        levels: (value or range of values, configurations with it, mean over the logs).
+        span_percent: from the best level to the worst, of the mean of all.
+    """
+
+    key: str
+    levels: tuple[tuple[str, int, Interval], ...]
+    span_percent: float
+
+
+@dataclass(frozen=True)
 class OneRun:
     """A run worth looking at: where it is, how bad it is (None: it failed or is missing), and what it said."""
 
@@ -108,6 +132,9 @@ class BatchData:
         differences: by metric.
         worst: runs, the worst first. failed, missing: runs, in order of the batch.
         labels: unit and definition of every metric.
+        settings: of each configuration those that not all of them have, by key.
+        trades: error against time; effects: of swept settings, the strongest first.
+        quantiles: of the metric over the runs of each configuration, in rising order.
     """
 
     title: str
@@ -123,3 +150,7 @@ class BatchData:
     failed: tuple[OneRun, ...]
     missing: tuple[OneRun, ...]
     labels: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    settings: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    trades: tuple[Trade, ...] = ()
+    effects: tuple[Effect, ...] = ()
+    quantiles: Mapping[str, tuple[float, ...]] = field(default_factory=dict)

@@ -1,12 +1,12 @@
-"""A batch -> tables and sentences: the same on the terminal and on the page."""
+"""A batch -> sentences: the same on the terminal and on the page."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from wallkit.core.results import Distribution, Interval, Paired
-from wallkit.report.batch import BatchData, Candidate, Contest, Difference, Factor, Level, OneRun, Summary
-from wallkit.report.paper import MISSING, paper_text
+from wallkit.core.results import Interval, Paired
+from wallkit.report.batch import BatchData, Candidate, Contest, Difference, OneRun
+from wallkit.report.paper import paper_text
 
 WORDS = {
     "error_mean_m": "error",
@@ -22,70 +22,15 @@ WORDS = {
     "was_false_healthy": "share of runs false healthy",
     "false_healthy": "false healthy scans",
 }
-Table = tuple[list[str], list[list[str]]]
 # in a sentence: more of it and less of it
 _SIDES = dict.fromkeys(("updates_to_converge", "false_healthy"), ("more", "fewer"))
-_SIGNIFICANT_P, _FEWEST_LOGS = 0.05, 6
-_SHOWN_RUNS = 5
+_SIGNIFICANT_P, FEWEST_LOGS = 0.05, 6
+_SHOWN_RUNS, _MOST_SENTENCES = 5, 12
 
 
 def word_of(key: str) -> str:
     """What a metric is called in a sentence."""
     return WORDS.get(key, key)
-
-
-def error_table(data: BatchData) -> Table:
-    """A row for each configuration: its runs, and how the metric in question is spread over them."""
-    word = word_of(data.key)
-    headers = [
-        "configuration",
-        "done",
-        "failed",
-        "missing",
-        f"mean {word}",
-        "95 %",
-        "median",
-        "p95",
-        "worst",
-        "sd of seeds",
-    ]
-    rows = []
-    for s in data.summaries:
-        found = s.numbers.get(data.key)
-        cells = [MISSING] * 6 if found is None else _spread_cells(found)
-        rows.append([s.name, str(s.done), str(s.failed), str(s.missing), *cells])
-    return headers, rows
-
-
-def other_table(data: BatchData) -> Table:
-    """A row for each configuration: how often it held, and what it cost. Columns that no run has are left out."""
-    keys = [k for k in _OTHERS if any(k in s.numbers for s in data.summaries)]
-    rows = [[s.name, *(_mean_cell(s.numbers.get(key)) for key in keys)] for s in data.summaries]
-    return ["configuration", *(_OTHERS[key] for key in keys)], rows
-
-
-def paper_table(summaries: Sequence[Summary]) -> Table:
-    """The columns papers on localization print; updates to converge are of the runs that did."""
-    headers = ["configuration", "runs", "converged", *_IN_PAPERS.values(), "sd over runs"]
-    rows = []
-    for s in summaries:
-        cells = [_mean_cell(s.numbers.get(key)) for key in _IN_PAPERS]
-        error = s.numbers.get("error_mean_m")
-        sd = paper_text(error.sd, error.unit) if error is not None and error.sd is not None else MISSING
-        rows.append([s.name, str(s.done), _mean_cell(s.numbers.get("converged")), *cells, sd])
-    return headers, rows
-
-
-def factor_table(factor: Factor, key: str) -> Table:
-    """The mean of a metric by configuration and level; what differs from the baseline, and `*` where that is certain."""
-    cells = {(s.name, level.name): _level_cell(level, s, key) for level in factor.levels for s in level.summaries}
-    names = [s.name for s in factor.levels[0].summaries] if factor.levels else []
-    levels = [(level.name, f"{level.name} ({count_text(level.logs, 'log')})") for level in factor.levels]
-    # the longer of the two goes down the page
-    if len(levels) > max(len(names), 8):
-        return [factor.key, *names], [[text, *(cells[n, level] for n in names)] for level, text in levels]
-    head = f"{factor.key} ="
-    return [head, *(text for _, text in levels)], [[n, *(cells[n, level] for level, _ in levels)] for n in names]
 
 
 def star_line(data: BatchData) -> str:
@@ -106,6 +51,29 @@ def tested_line(key: str, baseline: str, count: int) -> str:
     """What the sentences below it say."""
     several = f"; p corrected for {count} comparisons (Holm)" if count > 1 else ""
     return f"{word_of(key)} against {baseline}, over the logs and seeds both have{several}:"
+
+
+def difference_lines(differences: Sequence[Difference], key: str, baseline: str) -> Iterator[str]:
+    """A sentence for each; of many only for those that are better, and the others by name."""
+    if len(differences) <= _MOST_SENTENCES:
+        yield from (difference_line(d, key, baseline) for d in differences)
+        return
+    known = sorted((d for d in differences if d.found is not None), key=lambda d: _change(d.found))
+    yield from (difference_line(d, key, baseline) for d in known if d.found is not None and d.found.better == "b")
+    groups = {
+        "worse": [d.name for d in known if d.found is not None and d.found.better == "a"],
+        "most logs and the mean do not agree": [d.name for d in known if d.found is not None and is_undecided(d.found)],
+        "no run in common": [d.name for d in differences if d.found is None],
+    }
+    said = {name for names in groups.values() for name in names}
+    rest = [d.name for d in known if d.name not in said and d.found is not None and d.found.better == "neither"]
+    for what, names in {**groups, "no difference can be told": rest}.items():
+        if names:
+            yield f"{what}: {len(names)} of {len(differences)}: {', '.join(names)}"
+
+
+def _change(found: Paired | None) -> float:
+    return 0.0 if found is None else found.percent.value if found.percent else found.difference.value
 
 
 def difference_line(difference: Difference, key: str, baseline: str) -> str:
@@ -145,18 +113,39 @@ def contest_lines(contest: Contest | None, key: str) -> list[str]:
     """Which configurations may be the best."""
     if contest is None:
         return ["The best cannot be named: no two logs have a run of every configuration."]
-    if contest.logs < _FEWEST_LOGS:
+    if contest.logs < FEWEST_LOGS:
         return [f"The best cannot be named: {count_text(contest.logs, 'log')} that all have are too few."]
     able = [c for c in contest.candidates if c.may_be]
     of = f"over {contest.logs} of {contest.of_logs} logs (those that every configuration has)"
     if len(able) == 1:
         first = f"Best by {word_of(key)}: {_candidate(able[0], contest.unit)}; no other can be taken for it, {of}."
     elif len(able) == len(contest.candidates):
-        first = f"Best by {word_of(key)}: any of the {len(able)} may be; they cannot be told apart {of}."
+        first = f"Best by {word_of(key)}: any of the {len(able)} may be; all pairs at once cannot be told apart {of}."
     else:
         names = "; ".join(_candidate(c, contest.unit) for c in able)
         first = f"Best by {word_of(key)}: one of these {len(able)} of {len(contest.candidates)}, {of}: {names}."
     return [first, *([f"No run to compare: {', '.join(contest.absent)}."] if contest.absent else [])]
+
+
+def verdict_lines(data: BatchData) -> list[str]:
+    """What stands at the top: who is better, and what is not there."""
+    lost = len(data.failed) + len(data.missing)
+    absent = [f"{count_text(len(data.failed), 'run')} failed and {len(data.missing)} are missing."] if lost else []
+    if len(data.summaries) < 2:
+        found = data.summaries[0].numbers.get(data.key)
+        mean = "none" if found is None else mean_text(found.mean.value, found.unit)
+        return [
+            f"{data.summaries[0].name}: mean {word_of(data.key)} {mean} over {count_text(data.logs, 'log')}.",
+            *absent,
+        ]
+    differences = data.differences.get(data.key, ())
+    better = [d.name for d in differences if d.found is not None and d.found.better == "b"]
+    worse = [d.name for d in differences if d.found is not None and d.found.better == "a"]
+    parts = [f"{side} than {data.baseline}: {', '.join(n)}" for side, n in (("Better", better), ("worse", worse)) if n]
+    said = "; ".join(parts) or f"By {word_of(data.key)} nothing can be told from {data.baseline}"
+    is_sole = data.contest is not None and sum(c.may_be for c in data.contest.candidates) == 1
+    best = contest_lines(data.contest, data.key)[:1] if is_sole else []
+    return [f"{said[0].upper()}{said[1:]}.", *best, *absent]
 
 
 def run_lines(runs: Sequence[OneRun], what: str) -> Iterator[str]:
@@ -188,53 +177,6 @@ def count_text(number: int, what: str) -> str:
 
 # -------------------------------------------------------------------------------------------- details
 
-_OTHERS = {
-    "converged": "converged",
-    "was_lost": "ever lost",
-    "lost_share": "scans lost",
-    "was_false_healthy": "false healthy runs",
-    "updates_to_converge": "updates to converge",
-    "kept_share": "returns kept",
-    "update_mean_ms": "time per update",
-    "cpu_percent": "CPU",
-    "peak_memory_mb": "memory",
-}
-_IN_PAPERS = {
-    "update_mean_ms": "time per update",
-    "cpu_percent": "CPU",
-    "error_mean_m": "mean error",
-    "updates_to_converge": "updates to converge",
-    "peak_memory_mb": "memory",
-    "false_healthy": "false healthy",
-}
-
-
-def _spread_cells(found: Distribution) -> list[str]:
-    def text(number: float | None) -> str:
-        return MISSING if number is None else mean_text(number, found.unit)
-
-    mean = text(found.mean.value) + (f" ({found.without} without)" if found.without else "")
-    low, high = text(found.mean.low), text(found.mean.high)
-    bounds = MISSING if found.mean.low is None else f"{low} to {high}"
-    return [mean, bounds, *(text(n) for n in (found.median.value, found.tail.value, found.worst, found.sd_seeds))]
-
-
-def _mean_cell(found: Distribution | None) -> str:
-    return MISSING if found is None else mean_text(found.mean.value, found.unit)
-
-
-def _level_cell(level: Level, summary: Summary, key: str) -> str:
-    text = _mean_cell(summary.numbers.get(key))
-    for difference in level.differences.get(key, ()):
-        found = difference.found
-        if difference.name == summary.name and found is not None:
-            certain = "" if found.better == "neither" else "*"
-            change = f"{found.percent.value:+.0f} %" if found.percent else mean_text(found.difference.value, found.unit)
-            text += f" {change}{certain}"
-    if lost := summary.failed + summary.missing:
-        text += f" ({summary.done} of {summary.done + lost} runs)"
-    return text
-
 
 def _size(found: Paired, number: Interval) -> str:
     """`12 %`: how large, without its sign."""
@@ -265,7 +207,8 @@ def _digits(number: float) -> str:
 
 def _how_sure(found: Paired) -> str:
     units = count_text(found.units, "log") if found.over == "logs" else f"{found.units} seeds of one log"
-    return f"{_p_text(found)}, {units}, better on {found.b_better}"
+    side = f"worse on {found.a_better}" if found.better == "a" else f"better on {found.b_better}"
+    return f"{_p_text(found)}, {units}, {side}"
 
 
 def _p_text(found: Paired) -> str:

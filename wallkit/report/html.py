@@ -1,4 +1,4 @@
-"""A run, or several -> one self-contained HTML page: no script, no link, nothing fetched from anywhere.
+"""A run, or several -> one self-contained HTML page: no script, nothing fetched from anywhere.
 
 All text is escaped by jinja2, and a content security policy in the page forbids scripts and network on top of that:
 titles, topics and file names come from other people's logs.
@@ -26,7 +26,7 @@ def write_report(path: Path, data: ReportData) -> None:
     Raises:
         OutputError: the file cannot be written.
     """
-    _write(path, report_html(data))
+    write_page(path, report_html(data))
 
 
 def write_comparison(path: Path, data: CompareData) -> None:
@@ -35,7 +35,7 @@ def write_comparison(path: Path, data: CompareData) -> None:
     Raises:
         OutputError: the file cannot be written.
     """
-    _write(path, compare_html(data))
+    write_page(path, compare_html(data))
 
 
 def report_html(data: ReportData) -> str:
@@ -95,7 +95,12 @@ def _data_uri(picture: Picture) -> str:
     return "data:image/svg+xml;base64," + base64.b64encode(picture.svg).decode()
 
 
-def _write(path: Path, page: str) -> None:
+def write_page(path: Path, page: str) -> None:
+    """Writes a page of text.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
     # a file name that is not valid text reaches us with lone surrogates, which no encoding can write
     data = page.encode("utf-8", errors="replace")
     try:

@@ -13,6 +13,7 @@ from wallkit.errors import WallkitError
 from wallkit.evaluate.best import find_best
 from wallkit.evaluate.over_logs import compare_pairs, corrected, distribution
 from wallkit.pipelines.batch.runs import FAILED, MISSING, Runs, index_of, levels_of
+from wallkit.pipelines.batch.sweep import effects_of, quantiles_of, settings_of, trades_of
 from wallkit.report.batch import BatchData, Candidate, Contest, Difference, Factor, Level, OneRun, Summary
 
 # what is told of every configuration, where its runs have it
@@ -68,6 +69,7 @@ def compare_batch(runs: Runs, question: Question, *, title: str) -> BatchData:
     rng = np.random.default_rng(np.random.SeedSequence(question.seed))
     shown = (*metrics, *(key for key in SHOWN if key in runs.columns and key not in metrics))
     main = metrics[0]
+    summaries = _summaries(rng, runs, shown)
     factors = tuple(Factor(key, _levels(rng, runs, key, base, metrics, shown)) for key in question.by)
     return BatchData(
         title=title,
@@ -75,7 +77,7 @@ def compare_batch(runs: Runs, question: Question, *, title: str) -> BatchData:
         unit=labels[main].unit,
         baseline=runs.configurations[base],
         logs=len(runs.logs),
-        summaries=_summaries(rng, runs, shown),
+        summaries=summaries,
         differences=_differences(rng, runs, base, metrics),
         contest=_contest(rng, runs, main) if labels[main].better else None,
         factors=factors,
@@ -83,6 +85,10 @@ def compare_batch(runs: Runs, question: Question, *, title: str) -> BatchData:
         failed=tuple(_one(runs, i, None) for i in np.flatnonzero(runs.status == FAILED).tolist()),
         missing=tuple(_one(runs, i, None) for i in np.flatnonzero(runs.status == MISSING).tolist()),
         labels={key: (runs.column(key).label.unit, runs.column(key).label.definition) for key in shown},
+        settings=settings_of(runs),
+        trades=trades_of(summaries, main),
+        effects=effects_of(rng, runs, main),
+        quantiles=quantiles_of(runs, main),
     )
 
 
