@@ -17,11 +17,13 @@ from wallkit.core.results import Distribution, Interval, Paired, Value
 from wallkit.core.types import Float64Array, Int64Array
 from wallkit.evaluate.statistics import SIGNIFICANT_P, signed_rank_p
 
-RESAMPLES = 2000
+# numbers drawn for one interval, and the resamples that are made of them at least and at most
+_DRAWN = 3_000_000
+_LEAST, RESAMPLES = 500, 2000
 # of a comparison, whose verdict may hang on the end of its interval
 _RESAMPLES_OF_PAIRS = 10_000
 # numbers in one block of resamples x runs
-_BLOCK = 4_000_000
+_BLOCK = 1_000_000
 _TAIL = 0.95
 
 
@@ -141,9 +143,9 @@ def _resampled(
 ) -> Float64Array:
     """(3, resamples) the statistics with the logs drawn again."""
     count = int(of_log.max()) + 1
-    found, rows = [], max(1, _BLOCK // len(numbers))
-    for start in range(0, resamples, rows):
-        drawn = rng.multinomial(count, np.full(count, 1 / count), size=min(rows, resamples - start))
+    found, sizes = [], _blocks(resamples, len(numbers))
+    for size in sizes:
+        drawn = rng.multinomial(count, np.full(count, 1 / count), size=size)
         found.append(_statistics(numbers, drawn[:, of_log] * weights))
     return np.concatenate(found, axis=1)
 
@@ -192,16 +194,26 @@ def _differences(
 ) -> tuple[Interval, Interval | None, Interval | None]:
     """Mean of b - a; the same in per cent of the mean of a; median of the per cent of each unit: the units drawn again."""
     count, difference = len(a), float((b - a).mean())
-    drawn = rng.integers(0, count, (resamples, count))
-    means, differences = a[drawn].mean(axis=1), (b - a)[drawn].mean(axis=1)
+    has_middle = bool(np.all(a > 0))
+    changes = 100 * (b - a) / a if has_middle else np.zeros(count)
+    found = []
+    for size in _blocks(resamples, count):
+        drawn = rng.integers(0, count, (size, count))
+        middles = np.median(changes[drawn], axis=1) if has_middle else np.zeros(size)
+        found.append(np.array([a[drawn].mean(axis=1), (b - a)[drawn].mean(axis=1), middles]))
+    means, differences, middles = np.concatenate(found, axis=1)
     interval = _interval(difference, differences, count)
     if label.unit in ("share", "%") or not np.all(means > 0):
         return interval, None, None
     percent = _interval(100 * difference / float(a.mean()), 100 * differences / means, count)
-    if not np.all(a > 0):
-        return interval, percent, None
-    changes = 100 * (b - a) / a
-    return interval, percent, _interval(float(np.median(changes)), np.median(changes[drawn], axis=1), count)
+    return interval, percent, _interval(float(np.median(changes)), middles, count) if has_middle else None
+
+
+def _blocks(resamples: int, numbers: int) -> list[int]:
+    """Sizes of the blocks in which resamples of so many numbers are drawn; many numbers are drawn less often."""
+    wanted = max(min(resamples, _LEAST), min(resamples, _DRAWN // numbers))
+    size = max(1, _BLOCK // numbers)
+    return [min(size, wanted - start) for start in range(0, wanted, size)]
 
 
 def _interval(value: float, drawn: Float64Array, count: int) -> Interval:
