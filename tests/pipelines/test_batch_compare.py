@@ -13,7 +13,16 @@ from wallkit.errors import WallkitError
 from wallkit.pipelines.batch.compare import Question, compare_batch
 from wallkit.pipelines.batch.gather import gather
 from wallkit.pipelines.batch.labels import labels_of_runs
-from wallkit.pipelines.batch.runs import DONE, FAILED, MISSING, levels_of, natural, where, with_parts_of_names
+from wallkit.pipelines.batch.runs import (
+    DONE,
+    FAILED,
+    MISSING,
+    levels_of,
+    natural,
+    setting_text,
+    where,
+    with_parts_of_names,
+)
 from wallkit.report import batch_tables as tables
 from wallkit.report import batch_words as words
 
@@ -143,6 +152,7 @@ def test_patterns_that_do_not_fit():
     with pytest.raises(WallkitError, match="names no part"):
         with_parts_of_names(runs, "place-people")
     assert [name for name, _ in levels_of(runs, "crowd")] == ["0", "2", "12"]
+    assert [setting_text(v) for v in (["a", "b"], [], None, 0.1)] == ["a+b", "none", "", "0.1"]
     assert sorted(["b12", "b2", "10", "9", "a"], key=natural) == ["9", "10", "a", "b2", "b12"]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from wallkit.core.results import Value
 from wallkit.core.types import Float64Array, Int64Array
-from wallkit.pipelines.batch.runs import MISSING, Column, Runs, with_shares
+from wallkit.pipelines.batch.runs import MISSING, Column, Runs, setting_text, with_shares
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +119,7 @@ class _Table:
         facts["seed"] = tuple(str(seed) for seed in numbers["seed"].tolist())
         facts["configuration"] = tuple(names[i] for i in numbers["configuration"].tolist())
         for key in dict.fromkeys(key for settings in self.settings for key in settings):
-            values = [str(settings.get(key, "")) for settings in self.settings]
+            values = [setting_text(settings.get(key)) for settings in self.settings]
             if len(set(values)) > 1:
                 facts[key] = tuple(values[i] for i in numbers["configuration"].tolist())
         return facts

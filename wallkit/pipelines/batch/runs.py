@@ -175,6 +175,13 @@ def levels_of(runs: Runs, key: str) -> list[tuple[str, BoolArray]]:
     return [(text, np.asarray(texts == text)) for text in sorted(set(texts.tolist()), key=natural)]
 
 
+def setting_text(value: object) -> str:
+    """A setting as a word; a list is its parts, and an empty one `none`."""
+    if isinstance(value, list | tuple):
+        return "+".join(str(part) for part in value) or "none"
+    return "" if value is None else str(value)
+
+
 def natural(text: str) -> tuple[tuple[int, float, str], ...]:
     """Sorts 2 before 12, alone or inside of a name."""
     pieces = re.split(r"(\d+(?:\.\d+)?)", text)

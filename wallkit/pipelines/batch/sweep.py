@@ -10,7 +10,7 @@ from wallkit.core.results import Value
 from wallkit.core.types import BoolArray
 from wallkit.evaluate.best import find_front
 from wallkit.evaluate.over_logs import distribution
-from wallkit.pipelines.batch.runs import Runs, natural
+from wallkit.pipelines.batch.runs import Runs, natural, setting_text
 from wallkit.report.batch import Effect, Summary, Trade
 
 COST = "update_mean_ms"
@@ -22,7 +22,7 @@ _QUANTILES = 100
 def settings_of(runs: Runs) -> dict[str, dict[str, str]]:
     """Of each configuration the settings that not all of them have alike."""
     keys = dict.fromkeys(key for settings in runs.settings for key in settings)
-    texts = {key: [_text(settings.get(key)) for settings in runs.settings] for key in keys}
+    texts = {key: [setting_text(settings.get(key)) for settings in runs.settings] for key in keys}
     swept = [key for key, values in texts.items() if len(set(values)) > 1]
     return {name: {key: texts[key][i] for key in swept} for i, name in enumerate(runs.configurations)}
 
@@ -88,7 +88,3 @@ def _groups(texts: Sequence[str]) -> list[tuple[str, BoolArray]]:
         (f"{numbers[index == i].min():.3g} to {numbers[index == i].max():.3g}", np.asarray(index == i))
         for i in sorted(set(index.tolist()))
     ]
-
-
-def _text(value: object) -> str:
-    return "" if value is None else str(value)
