@@ -78,7 +78,7 @@ def compare(
 
     RUN is a result folder, of one seed or several, or a folder of such folders: one configuration over several logs.
 
-    With --paper or an option for many logs, all intervals and tests are over logs, since runs of one log are alike.
+    Over several logs all intervals and tests are over logs, since runs of one log are alike.
 
     \b
     Examples:

@@ -31,7 +31,7 @@ batch_options = common.options(
 
 
 def is_for(runs: tuple[Path, ...], flags: dict[str, Any]) -> bool:
-    """Whether what is named are many logs: folders of folders, and an option that only makes sense there."""
+    """Whether what is named are many logs: several folders of folders, or one and an option that only makes sense there."""
     from wallkit.pipelines.batch.folders import is_folder_of_runs
 
     asked = [
@@ -41,7 +41,8 @@ def is_for(runs: tuple[Path, ...], flags: dict[str, Any]) -> bool:
     if asked and others:
         message = f"{', '.join(asked)} is for folders of result folders, and {others[0]} is none"
         raise click.UsageError(message)
-    return bool((asked or flags["paper"]) and not others)
+    # a single folder without a question is shown as its runs
+    return not others and (bool(asked) or flags["paper"] or len(runs) > 1)
 
 
 def compare(
@@ -153,6 +154,12 @@ def _sentences(data: BatchData) -> Iterator[str]:
     if len(data.summaries) > 1 and data.contest is not None:
         yield ""
         yield from words.contest_lines(data.contest, data.key)
+    if data.worst:
+        yield ""
+        yield "worst runs:"
+        for run in data.worst[:_WORST]:
+            text = words.mean_text(run.value or 0.0, data.unit)
+            yield f"  {words.run_name(run)}: {text}{f'  {run.folder}' if run.folder else ''}"
     for runs, what in ((data.failed, "failed"), (data.missing, "missing: asked for, and not run yet")):
         if runs:
             yield ""
@@ -178,4 +185,5 @@ def _text(table: Table) -> str:
     return common.table(headers, rows, right=tuple(range(1, len(headers))))
 
 
+_WORST = 5
 _PLURAL = {"metric": "metrics"}

@@ -86,9 +86,9 @@ def places_figure(places: Places) -> Picture:
 
 
 def cell_size(corners: Float64Array) -> float:
-    """Side of a place [m]: some eighty along the map's longer side, between 0.1 and 2 m."""
+    """Side of a place [m]: sixty or more along the map's longer side, unless they would be under 0.1 or over 2 m."""
     longest = float(np.ptp(corners, axis=0).max())
-    return min(max(canvas.round_step(max(longest, 1e-3) / 80), 0.1), 2.0)
+    return max((side for side in (0.2, 0.25, 0.5, 1.0, 2.0) if side <= longest / 60), default=0.1)
 
 
 # -------------------------------------------------------------------------------------------- details

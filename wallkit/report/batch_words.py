@@ -142,7 +142,7 @@ def verdict_lines(data: BatchData) -> list[str]:
     better = [d.name for d in differences if d.found is not None and d.found.better == "b"]
     worse = [d.name for d in differences if d.found is not None and d.found.better == "a"]
     parts = [f"{side} than {data.baseline}: {', '.join(n)}" for side, n in (("Better", better), ("worse", worse)) if n]
-    said = "; ".join(parts) or f"By {word_of(data.key)} nothing can be told from {data.baseline}"
+    said = "; ".join(parts) or f"By {word_of(data.key)} no configuration can be told from {data.baseline}"
     is_sole = data.contest is not None and sum(c.may_be for c in data.contest.candidates) == 1
     best = contest_lines(data.contest, data.key)[:1] if is_sole else []
     return [f"{said[0].upper()}{said[1:]}.", *best, *absent]
