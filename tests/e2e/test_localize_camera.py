@@ -134,6 +134,14 @@ def test_a_cache_of_segmentations_changes_nothing_but_who_looks(world, tmp_path)
     assert other.sight.cache.kept < 0.4 * other.sight.cache.found
 
 
+def test_images_that_come_too_seldom_for_their_tolerance_are_said(world):
+    """Ten a second: 0.06 s is more than half of the time between two, 0.04 s is less."""
+    assert not warnings_of(ready(world))
+    (said,) = warnings_of(ready(world, words=("logs.image_tolerance_s=0.04",)))
+    assert "come every 0.1 s" in said
+    assert "--set logs.image_tolerance_s=0.06" in said
+
+
 def test_shrunken_masks_keep_fewer_returns_and_lost_images_none(world):
     kept = {
         word: localize(ready(world, words=(f"points.perturb.{word}",))).filtering

@@ -41,13 +41,13 @@ def test_masks_grow_and_shrink_by_a_disc(seed, radius):
     eaten = cv2.dilate(known.astype(np.uint8), disc(radius), borderValue=0) > 0
     np.testing.assert_array_equal(smaller.mask(walls), mask & ~eaten)
     # who does not change sides stays what it is
-    np.testing.assert_array_equal(larger.ids[mask], given.ids[mask])
-    np.testing.assert_array_equal(smaller.ids[~mask], given.ids[~mask])
-    assert (smaller.ids[mask & eaten] == 1).all()
+    np.testing.assert_array_equal(larger.labels()[mask], given.ids[mask])
+    np.testing.assert_array_equal(smaller.labels()[~mask], given.ids[~mask])
+    assert (smaller.labels()[mask & eaten] == 1).all()
 
 
 def test_nothing_grows_without_a_mask_or_by_nothing():
     given = class_map(np.ones((10, 10), int), NAMES)
-    np.testing.assert_array_equal(grown(given, ("wall",), 3.0).ids, given.ids)
+    np.testing.assert_array_equal(grown(given, ("wall",), 3.0).labels(), given.ids)
     other = class_map(drawn(0), NAMES)
-    np.testing.assert_array_equal(grown(other, ("wall",), 0.0).ids, other.ids)
+    np.testing.assert_array_equal(grown(other, ("wall",), 0.0).labels(), other.ids)

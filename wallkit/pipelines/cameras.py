@@ -14,6 +14,7 @@ from wallkit.core.calibration import Calibration
 from wallkit.core.types import CameraImage, CameraInfo, UInt8Array
 from wallkit.errors import CalibrationError, ConfigError, LogError, closest
 from wallkit.logs.images import pixels_from_image
+from wallkit.logs.message import Message
 from wallkit.logs.reader import Log
 from wallkit.logs.rig import CameraTopic
 from wallkit.logs.topics import IMAGE_KINDS, ORACLE, camera_of_topic, is_picture_name
@@ -21,6 +22,8 @@ from wallkit.points.project import check_usable
 
 # the model that asks the simulator, instead of looking
 ORACLE_MODEL = "oracle"
+# images that tell how often they come
+_FIRST = 12
 # intrinsics that differ more are of another camera or mode
 _SAME_FOCAL = 0.02
 
@@ -55,6 +58,7 @@ class Camera:
         picture_topic: of its pictures; "" where the log has only labels.
         calibration, source: and the file it came from.
         notes: what is odd about it, a sentence each.
+        interval_s: median time between its first images; None of a single one.
     """
 
     name: str
@@ -63,6 +67,8 @@ class Camera:
     calibration: Calibration
     source: Path
     notes: tuple[str, ...] = ()
+
+    interval_s: float | None = None
 
     @property
     def wanted(self) -> CameraTopic:
@@ -177,7 +183,7 @@ def _checked(log: Log, topic: str, calibration: Calibration, path: Path, *, allo
     Raises:
         CalibrationError: they are not. LogError: the first image cannot be read.
     """
-    first = log.first(topic)
+    first = log.first(topic, _FIRST)
     if not first or not isinstance(first[0].value, CameraImage):
         raise LogError(f"the topic {topic} holds no readable image", where=log.name, hint="choose another --camera")
     image = first[0].value
@@ -191,7 +197,25 @@ def _checked(log: Log, topic: str, calibration: Calibration, path: Path, *, allo
     info = _info_of(log, pictures[0] if pictures else topic, image.frame_id)
     if info is not None:
         notes += _compared(info, calibration, (width, height), topic, path, allow_unverified=allow_unverified)
-    return Camera(_name_of(topic), topic, pictures[0] if pictures else "", calibration, path, tuple(notes))
+    return Camera(
+        _name_of(topic), topic, pictures[0] if pictures else "", calibration, path, tuple(notes), _interval_s(first)
+    )
+
+
+def _interval_s(messages: Sequence[Message]) -> float | None:
+    """Median time between stamps; None of fewer than two messages."""
+    apart_ns = np.diff([message.stamp_ns for message in messages])
+    return float(np.median(apart_ns)) * 1e-9 if len(apart_ns) else None
+
+
+def too_seldom(camera: Camera, tolerance_s: float) -> tuple[str, ...]:
+    """What is odd about how far from a scan an image may be: scans between two images have none."""
+    if camera.interval_s is None or camera.interval_s / 2 < tolerance_s:
+        return ()
+    said = f"images of {camera.topic} come every {camera.interval_s:.2g} s, and one farther than {tolerance_s:g} s from"
+    return (
+        f"{said} a scan is not used: --set logs.image_tolerance_s={0.6 * camera.interval_s:.2g} leaves no scan out",
+    )
 
 
 def _doubts(calibration: Calibration, path: Path) -> list[str]:

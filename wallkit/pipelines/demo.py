@@ -15,6 +15,7 @@ from wallkit.pipelines.localize import Request, prepare
 from wallkit.pipelines.report import compare_runs, write_compare_report
 from wallkit.pipelines.run_folder import RunRecord, read_json, write_json
 from wallkit.pipelines.seeds import run_seed
+from wallkit.pipelines.shared import Shared
 
 SAMPLE = Path(wallkit.sample.__file__).parent
 
@@ -37,6 +38,7 @@ class Demo:
 def run_demo(out: Path, observe: Callable[[str], None] | None = None) -> Demo:
     """Localize the sample with every method, write each run and the comparison, and compare with expected.json."""
     runs: dict[str, tuple[RunRecord, Evaluation]] = {}
+    shared = Shared()
     for name, words in METHODS.items():
         if observe:
             observe(name)
@@ -44,7 +46,7 @@ def run_demo(out: Path, observe: Callable[[str], None] | None = None) -> Demo:
         request = Request((SAMPLE / "log.mcap",), SAMPLE / "floor.wkmap.urdf", init="global")
         folder = out / name
         folder.mkdir(parents=True)
-        _, record, evaluation = run_seed(prepare(request, loaded.config), loaded, folder)
+        _, record, evaluation = run_seed(prepare(request, loaded.config, shared=shared), loaded, folder)
         runs[name] = (record, evaluation)
     settings = load_config(None).config.evaluate
     data = compare_runs([[pair] for pair in runs.values()], list(runs), settings, seed=0)

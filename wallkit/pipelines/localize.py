@@ -240,7 +240,15 @@ def _find_sight(
     if not request.looks(config):
         return None, config, ""
     try:
-        sight = sight_of(log, request.cameras, config.points, config.segment, rig=rig, holds_scans=holds_scans)
+        sight = sight_of(
+            log,
+            request.cameras,
+            config.points,
+            config.segment,
+            rig=rig,
+            image_tolerance_s=config.logs.image_tolerance_s,
+            holds_scans=holds_scans,
+        )
     except WallkitError as error:
         if not request.cameras.may_fall_back:
             raise

@@ -23,6 +23,7 @@ from wallkit.pipelines.cameras import (
     find_cameras,
     ids_from_png,
     oracle_names,
+    too_seldom,
 )
 from wallkit.points.filters import PointsSettings
 from wallkit.points.look import ClassesAt, Look, LookSettings, look, project_frame
@@ -204,9 +205,13 @@ def sight_of(
     segment: SegmentSettings,
     *,
     rig: Rig,
+    image_tolerance_s: float,
     holds_scans: bool = False,
 ) -> Sight:
     """The cameras and the model, checked.
+
+    Args:
+        image_tolerance_s: how far from a scan an image may be.
 
     Raises:
         WallkitError: as `find_cameras`; ModelError: the model cannot be used, or knows nothing of what filters keep.
@@ -214,7 +219,10 @@ def sight_of(
     model = request.model or segment.model or DEFAULT
     is_oracle = model == ORACLE_MODEL
     cameras = find_cameras(log, request, is_oracle=is_oracle, lidar_frame=rig.lidar_frame)
-    cameras = tuple(_perturbed(camera, points.perturb) for camera in cameras)
+    cameras = tuple(
+        replace(camera, notes=(*camera.notes, *too_seldom(camera, image_tolerance_s)))
+        for camera in (_perturbed(camera, points.perturb) for camera in cameras)
+    )
     looks, names, roles, cache = _oracle(log, segment) if is_oracle else _network(model, segment)
     kept = _kept(points)
     if kept and not set(kept) & set(roles):
