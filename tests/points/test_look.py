@@ -10,9 +10,9 @@ import pytest
 from wallkit.core.calibration import Calibration
 from wallkit.core.camera import Camera
 from wallkit.core.geometry import compose, invert_matrix, relative, transform_points
-from wallkit.core.types import CameraImage, Frame, Points, View
+from wallkit.core.types import BeamLabels, CameraImage, Frame, Points, View
 from wallkit.points.labels import labelled_scan
-from wallkit.points.look import LookSettings, look, project_frame
+from wallkit.points.look import LookSettings, _share_out, look, project_frame
 from wallkit.points.outlines import classes_by_outlines
 from wallkit.points.project import hidden, project
 from wallkit.segment.class_map import class_map
@@ -180,3 +180,39 @@ def test_a_hidden_return_is_not_labelled():
     # the same line of sight: from (0.2, 0, 0.8) through (2.7, 0, 0.55) to (5.2, 0, 0.3)
     frame = replace(frame, cloud_m=np.array([[5.2, 0, 0.3], [2.7, 0.0, 0.55]], np.float32))
     assert located(frame, view_at((0, 0, 0)))[1].tolist() == [False]
+
+
+@pytest.mark.parametrize("samples", [1, 7])
+def test_shares_are_those_of_a_loop_over_classes(samples):
+    rng = np.random.default_rng(samples)
+    count, class_of = 400, np.array([0, 1, 1, 2, -1])
+    found = rng.choice([0, 1, 2, 3, -1], (samples, count), p=[0.7, 0.1, 0.1, 0.05, 0.05])
+    sure = rng.uniform(0.2, 1, (samples, count)).astype(np.float32)
+    seen = np.sort(rng.choice(500, count, replace=False))
+    labels, confidences, shares = np.full(500, -1), np.zeros(500, np.float32), np.zeros((500, 3), np.float32)
+    _share_out(found.ravel(), sure.ravel(), class_of, seen, samples, 0.666, labels, confidences, shares)
+    weights = np.array([1.0]) if samples == 1 else np.array([0.666, *[0.334 / 6] * 6])
+    shown = class_of[found]
+    of_class = np.stack([(weights[:, None] * (shown == c)).sum(axis=0) for c in range(3)], axis=1)
+    known = of_class.sum(axis=1)
+    some = known > 0
+    np.testing.assert_allclose(shares[seen][some], (of_class / np.where(some, known, 1)[:, None])[some], atol=1e-6)
+    assert (labels[seen] == np.where(some, shares[seen].argmax(axis=1), -1)).all()
+    of_best = weights[:, None] * (shown == labels[seen])
+    expected = (of_best * sure).sum(axis=0) / np.where(some, of_best.sum(axis=0), 1)
+    np.testing.assert_allclose(confidences[seen][some], expected[some], atol=1e-6)
+    assert not shares[np.setdiff1d(np.arange(500), seen)].any()
+
+
+def test_labels_go_from_beams_to_returns_also_where_there_are_too_few():
+    frame = frame_of([[2.0, 0, 0.3], [3.0, 0, 0.3], [4.0, 0, 0.3]])
+    frame = replace(frame, points=replace(frame.points, beams=np.array([2, 0, 5])))
+    given = BeamLabels(0, np.array([1, 0, -1]), ("a", "b"), np.array([0.5, 0.6, 0.7]), np.eye(3, 2, dtype=np.float32))
+    scan = labelled_scan(replace(frame, labels=given))
+    np.testing.assert_array_equal(scan.labels, [-1, 1, -1])
+    np.testing.assert_array_equal(scan.shares, [[0, 0], [1, 0], [0, 0]])
+    np.testing.assert_allclose(scan.confidences, [0.7, 0.5, 0])
+    bare = labelled_scan(replace(frame, labels=BeamLabels(0, np.array([1, 0, 1, 0, 0, 1]), ("a", "b"))))
+    np.testing.assert_array_equal(bare.labels, [1, 1, 1])
+    assert bare.shares is None
+    assert bare.confidences is None

@@ -43,18 +43,24 @@ class Kept:
 def kept_of(scan: LabelledScan, settings: KeptSettings) -> Kept:
     """What is left of a scan, and whether it is too little."""
     kept = np.flatnonzero(scan.weights >= settings.weight)
-    order = kept[np.argsort(scan.points.beams[kept], kind="stable")]
-    across = float(_share_across(scan.points.xyz_m[order]))
+    beams = scan.points.beams[kept]
+    # a planar scan is in order already
+    order = kept if (beams[1:] >= beams[:-1]).all() else kept[np.argsort(beams, kind="stable")]
+    across = float(_share_across(scan.points.xyz_m, order))
     is_few = len(kept) < settings.least
     return Kept(len(scan.weights), len(kept), across, is_few, not is_few and across < settings.least_share_across)
 
 
 @njit(cache=True, nogil=True)
-def _share_across(xyz: Any) -> Any:
-    """Smaller eigenvalue over the sum of both, of the scatter of normals between returns five apart on one surface."""
+def _share_across(xyz: Any, order: Any) -> Any:
+    """Smaller eigenvalue over the sum of both, of the scatter of normals between returns five apart on one surface.
+
+    order: places of the returns in xyz, as they lie beside each other.
+    """
     xx, xy, yy = 0.0, 0.0, 0.0
-    for k in range(5, len(xyz)):
-        dx, dy = xyz[k, 0] - xyz[k - 5, 0], xyz[k, 1] - xyz[k - 5, 1]
+    for n in range(5, len(order)):
+        k, before = order[n], order[n - 5]
+        dx, dy = xyz[k, 0] - xyz[before, 0], xyz[k, 1] - xyz[before, 1]
         square = dx * dx + dy * dy
         if 0 < square < 0.25:
             xx += dx * dx / square

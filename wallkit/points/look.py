@@ -81,7 +81,9 @@ def project_frame(
     assert calibration.T_camera_lidar is not None  # check_usable
     T = calibration.T_camera_lidar @ T_lidar_base @ matrix_from_pose(relative(view.odometry, frame.odometry))
     projection = Projection(*project_points(calibration.camera, T, frame.points.xyz_m))
-    is_seen = projection.is_inside & _in_view(T, frame.points.xyz_m, settings.field_of_view_deg)
+    is_seen = projection.is_inside
+    if settings.field_of_view_deg:
+        is_seen = is_seen & _in_view(T, frame.points.xyz_m, settings.field_of_view_deg)
     if frame.cloud_m is not None:
         cloud = Projection(*project_points(calibration.camera, T, frame.cloud_m))
         near = {"margin_m": settings.hidden_m, "margin_per_m": settings.hidden_per_m}
@@ -114,8 +116,6 @@ def look(
 
 def _in_view(T: Float64Array, xyz_m: Float32Array, field_of_view_deg: float) -> BoolArray:
     """(K,) points (K, 3), which T (4, 4) moves to the camera, that are not too far to its side."""
-    if field_of_view_deg == 0:
-        return np.ones(len(xyz_m), dtype=np.bool_)
     x, z = (xyz_m @ T[row, :3] + T[row, 3] for row in (0, 2))
     return np.asarray(np.abs(np.arctan2(x, z)) <= np.deg2rad(field_of_view_deg) / 2)
 
@@ -200,8 +200,25 @@ def _share_out(
     count = len(seen)
     around = (1.0 - middle) / (samples - 1) if samples > 1 else 0.0
     first = middle if samples > 1 else 1.0
+    # of a class that all places show: the same sums as below, once
+    whole, weights = np.zeros(1, dtype=np.float32), 0.0
+    for s in range(samples):
+        weight = first if s == 0 else around
+        whole[0] += weight
+        weights += weight
+    whole[0] /= weights
     for m in range(count):
         k, known = seen[m], 0.0
+        c, one = class_of[found[m]], True
+        for s in range(1, samples):
+            one &= found[s * count + m] == found[m]
+        if one:
+            if c >= 0:
+                total = first * sure[m]
+                for s in range(1, samples):
+                    total += around * sure[s * count + m]
+                shares[k, c], labels[k], confidences[k] = whole[0], c, total / weights
+            continue
         for s in range(samples):
             c = class_of[found[s * count + m]]
             if c >= 0:
@@ -216,10 +233,10 @@ def _share_out(
             if shares[k, c] > shares[k, best]:
                 best = c
         labels[k] = best
-        total, weights = 0.0, 0.0
+        total, of_best = 0.0, 0.0
         for s in range(samples):
             if class_of[found[s * count + m]] == best:
                 weight = first if s == 0 else around
                 total += weight * sure[s * count + m]
-                weights += weight
-        confidences[k] = total / weights
+                of_best += weight
+        confidences[k] = total / of_best

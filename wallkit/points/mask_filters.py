@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numba import njit
 
 from wallkit.core.config import setting
 from wallkit.core.types import Estimate, FieldSet, Float32Array, LabelledScan
@@ -40,7 +41,7 @@ class WallMask:
 
     def weigh(self, scan: LabelledScan, estimate: Estimate) -> Float32Array:
         """See BoundFilter."""
-        return _judged(scan, self.unseen_weight, lambda shares: shares @ _chosen(scan.classes, self.keep) >= _WHOLE)
+        return _between(scan, self.keep, _WHOLE, np.float32(np.inf), self.unseen_weight)
 
 
 @dataclass(frozen=True)
@@ -60,9 +61,7 @@ class RejectDynamic:
 
     def weigh(self, scan: LabelledScan, estimate: Estimate) -> Float32Array:
         """See BoundFilter."""
-        return _judged(
-            scan, self.unseen_weight, lambda shares: shares @ _chosen(scan.classes, self.reject) <= 1 - _WHOLE
-        )
+        return _between(scan, self.reject, np.float32(-np.inf), 1 - _WHOLE, self.unseen_weight)
 
 
 @dataclass(frozen=True)
@@ -105,6 +104,28 @@ class SoftMask:
     def classes() -> tuple[str, ...]:
         """That have a prior of their own."""
         return tuple(f.name for f in fields(SoftMask) if f.name != "unseen_weight")
+
+
+def _between(
+    scan: LabelledScan, names: tuple[str, ...], least: np.float32, most: np.float32, unseen_weight: float
+) -> Float32Array:
+    """(K,) weights: 1 where the share of some classes is in [least, most], 0 where it is not."""
+    chosen = _chosen(scan.classes, names)
+    if scan.labels is None or scan.shares is None or not scan.classes:
+        return _judged(scan, unseen_weight, lambda shares: (shares @ chosen >= least) & (shares @ chosen <= most))
+    weights = np.empty(len(scan.weights), dtype=np.float32)
+    _judge(scan.labels, scan.shares, chosen, least, most, np.float32(unseen_weight), weights)
+    return weights
+
+
+@njit(cache=True, nogil=True)
+def _judge(labels: Any, shares: Any, chosen: Any, least: Any, most: Any, unseen: Any, weights: Any) -> None:
+    """See _between, in one pass."""
+    for k in range(len(labels)):
+        total = np.float32(0.0)
+        for c in range(len(chosen)):
+            total += shares[k, c] * chosen[c]
+        weights[k] = unseen if labels[k] < 0 else np.float32(1.0) if least <= total <= most else np.float32(0.0)
 
 
 def _judged(scan: LabelledScan, unseen_weight: float, judge: Callable[[Float32Array], Any]) -> Float32Array:

@@ -11,8 +11,12 @@ from numpy.typing import ArrayLike
 
 from wallkit.core.polygon import POINT_IN_POLYGON, looked_up, mask_from, packed
 from wallkit.core.segmentation import BACKGROUND, Polygon, Segmentation
-from wallkit.core.types import Float32Array, Int64Array
+from wallkit.core.tiles import Tiles, tiles_of
+from wallkit.core.types import Float32Array, Float64Array, Int64Array
 from wallkit.points.look import ClassesAt
+
+# so many points make a table of tiles worth its cost
+_MANY = 2000
 
 
 def classes_by_outlines(segmentation: Segmentation, method: str) -> ClassesAt:
@@ -37,9 +41,16 @@ def classes_in(polygons: Sequence[Polygon], names: Sequence[str], shape: tuple[i
     # a mask is drawn once for the image, not for every question
     mask = mask_from(held, shape) if method == "mask" else None
 
+    tiles: list[Tiles] = []
+
+    def located(at: Float64Array) -> Int64Array:
+        return POINT_IN_POLYGON[method](at, held) if mask is None else looked_up(at, mask)
+
     def classes_at(pixels: ArrayLike) -> tuple[Int64Array, Float32Array]:
         at = np.ascontiguousarray(pixels, dtype=np.float64)
-        found = POINT_IN_POLYGON[method](at, held) if mask is None else looked_up(at, mask)
+        if mask is None and not tiles and len(at) >= _MANY:
+            tiles.append(tiles_of(held, shape, located))
+        found = tiles[0].found(at, located) if tiles else located(at)
         confidences = np.empty(len(found), dtype=np.float32)
         _name(at, labels, sure, width, height, found, confidences)
         return found, confidences

@@ -39,13 +39,13 @@ class ScoreMap:
 
     def classes_at(self, pixels: ArrayLike) -> tuple[Int64Array, Float32Array]:
         """See Segmentation."""
-        at = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
-        _, _, inside = nearest_cells(at, self.shape)
-        labels, confidences = np.full(len(at), -1, dtype=np.int64), np.zeros(len(at), dtype=np.float32)
-        columns, rows = self._cells(np.where(inside[:, None], at, 0)).T
-        sampled = _sample(self.scores, np.ascontiguousarray(columns), np.ascontiguousarray(rows))
-        labels[inside] = sampled.argmax(axis=1)[inside]
-        confidences[inside] = _shares(sampled, is_probability=self.is_probability).max(axis=1)[inside]
+        at = np.ascontiguousarray(pixels, dtype=np.float64).reshape(-1, 2)
+        labels, confidences = np.empty(len(at), dtype=np.int64), np.empty(len(at), dtype=np.float32)
+        (height, width), (gain_u, gain_v), (top, left) = self.shape, self.frame.gains, self.frame.corner
+        rows, columns, _ = self.scores.shape
+        cell = self.frame.net[1] / columns, self.frame.net[0] / rows
+        lies = width, height, gain_u, gain_v, float(left), float(top), *cell
+        _sample(at, self.scores, lies, self.is_probability, labels, confidences)
         return labels, confidences
 
     def labels(self) -> Int64Array:
@@ -141,19 +141,36 @@ def _shares(scores: Float32Array, *, is_probability: bool) -> Float32Array:
 
 
 @njit(cache=True, nogil=True)
-def _sample(scores, columns, rows):  # type: ignore[no-untyped-def]
-    """(K, C) bilinear scores (h, w, C) at columns and rows (K,)."""
-    height, width, classes = scores.shape
-    out = np.empty((len(columns), classes), dtype=np.float32)
-    for k in range(len(columns)):
-        left, top = int(columns[k]), int(rows[k])
-        right, bottom = min(left + 1, width - 1), min(top + 1, height - 1)
-        a, b = np.float32(columns[k] - left), np.float32(rows[k] - top)
+def _sample(pixels, scores, lies, is_probability, labels, sure):  # type: ignore[no-untyped-def]
+    """Fills labels and sure (K,) for pixels (K, 2); `lies` says where they are in the grid, as ScoreMap._cells."""
+    width, height, gain_u, gain_v, left_px, top_px, cell_u, cell_v = lies
+    rows, columns, classes = scores.shape
+    here = np.empty(classes, dtype=np.float32)
+    for k in range(len(pixels)):
+        u, v = pixels[k, 0], pixels[k, 1]
+        labels[k], sure[k] = -1, 0.0
+        if not (u >= -0.5 and v >= -0.5 and u < width - 0.5 and v < height - 0.5):
+            continue
+        x = min(max(((u + 0.5) * gain_u + (left_px - 0.5) + 0.5) / cell_u - 0.5, 0.0), columns - 1.0)
+        y = min(max(((v + 0.5) * gain_v + (top_px - 0.5) + 0.5) / cell_v - 0.5, 0.0), rows - 1.0)
+        left, top = int(x), int(y)
+        right, bottom = min(left + 1, columns - 1), min(top + 1, rows - 1)
+        a, b = np.float32(x - left), np.float32(y - top)
+        best = 0
         for c in range(classes):
             upper = scores[top, left, c] * (1 - a) + scores[top, right, c] * a
             lower = scores[bottom, left, c] * (1 - a) + scores[bottom, right, c] * a
-            out[k, c] = upper * (1 - b) + lower * b
-    return out
+            here[c] = upper * (1 - b) + lower * b
+            if here[c] > here[best]:
+                best = c
+        labels[k] = best
+        if is_probability:
+            sure[k] = here[best]
+            continue
+        total = np.float32(0.0)
+        for c in range(classes):
+            total += np.exp(here[c] - here[best])
+        sure[k] = np.float32(1.0) / total
 
 
 @njit(cache=True, nogil=True)

@@ -1,0 +1,54 @@
+"""A table of tiles answers as the polygons themselves do, for every point."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wallkit.core.polygon import POINT_IN_POLYGON, packed
+from wallkit.core.tiles import tiles_of
+
+SHAPE = (120, 160)
+
+
+def ring(rng, centre, radius, corners):
+    angles = np.sort(rng.uniform(0, 2 * np.pi, corners))
+    lengths = radius * rng.uniform(0.5, 1.0, corners)
+    return centre + lengths[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def drawn(rng):
+    """Overlapping polygons with a hole in every second, rectangles on whole pixels, and one larger than the image."""
+    found = []
+    for k in range(6):
+        centre = rng.uniform((0, 0), (160, 120))
+        rings = [ring(rng, centre, rng.uniform(10, 50), int(rng.integers(3, 30)))]
+        found.append([*rings, ring(rng, centre, 4.0, 8)] if k % 2 else rings)
+    left, top = (int(n) for n in rng.integers(0, 80, 2))
+    found.append([[(left, top), (left + 40, top), (left + 40, top + 30), (left, top + 30)]])
+    found.append([[(-50, -50), (500, -40), (480, 300), (-60, 310)]])
+    return found[:: int(rng.choice([1, -1]))]
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("method", ["crossing_number", "winding_number", "even_odd"])
+def test_tiles_answer_as_polygons_do(method, seed):
+    rng = np.random.default_rng(seed)
+    held = packed(drawn(rng)[: int(rng.integers(0, 9))])
+
+    def asked(at):
+        return POINT_IN_POLYGON[method](at, held)
+
+    at = rng.uniform((-10, -10), (170, 130), (20_000, 2))
+    if held.edges.shape[1]:
+        # beside edges, where a tile that is wrongly taken for clear would show
+        e = rng.integers(0, held.edges.shape[1], 4000)
+        share = rng.uniform(0, 1, (4000, 1))
+        on_edges = held.edges[:2, e].T * share + held.edges[2:4, e].T * (1 - share)
+        at = np.concatenate([at, on_edges + rng.normal(0, 1e-3, (4000, 2)), np.round(on_edges)])
+    at = np.concatenate([at, [[np.nan, 3.0], [3.0, np.inf], [-0.5, -0.5], [159.5, 119.5]]])
+    tiles = tiles_of(held, SHAPE, asked)
+    np.testing.assert_array_equal(tiles.found(at, asked), asked(at))
+    calls = []
+    tiles.found(at[:20_000], lambda rest: calls.append(len(rest)) or asked(rest))
+    assert sum(calls) < 0.75 * 20_000
