@@ -184,6 +184,9 @@ def test_folders_of_result_folders_are_read_as_a_batch(folders):
     assert "% lower error than basic, 95 % interval" in done.output
     assert "1 run failed:\n  soft, hall-0-1, seed 1: stopped before it ended" in done.output
     assert "people = 12, 6 logs" in done.output
+    whole = CliRunner().invoke(main, ["compare", ".", "--baseline", "soft"]).output
+    assert "\nbasic: " in whole
+    assert "% higher error than soft" in whole
     as_json = json.loads(CliRunner().invoke(main, ["compare", "basic", "soft", "--by", "log", "--json"]).output)
     (soft,) = as_json["differences"]["error_mean_m"]
     assert (soft["name"], soft["found"]["units"], soft["found"]["better"]) == ("soft", 18, "b")

@@ -76,7 +76,8 @@ def compare(
 ) -> None:
     """Put several runs side by side, with tests of significance against the first.
 
-    RUN is a result folder, of one seed or several, or a folder of such folders: one configuration over several logs.
+    RUN is a result folder, of one seed or several, or a folder of such folders: one configuration over several logs. A
+    folder of configurations stands for all of them.
 
     Over several logs all intervals and tests are over logs, since runs of one log are alike.
 
@@ -86,6 +87,7 @@ def compare(
       wallkit compare a/ b/ c/ -o compare.html
       wallkit compare --paper basic/ wall_mask/ soft_mask/
       wallkit compare basic/ wall_mask/ --by people --names "{scene}-{people}-{take}"
+      wallkit compare runs/ --baseline basic --metric lost_share
     """
     from dataclasses import asdict
 

@@ -32,8 +32,10 @@ batch_options = common.options(
 
 def is_for(runs: tuple[Path, ...], flags: dict[str, Any]) -> bool:
     """Whether what is named are many logs: several folders of folders, or one and an option that only makes sense there."""
-    from wallkit.pipelines.batch.folders import is_folder_of_runs
+    from wallkit.pipelines.batch.folders import configurations_in, is_folder_of_runs
 
+    if len(runs) == 1 and configurations_in(runs[0]):
+        return True
     asked = [
         f"--{name}" for name in ("baseline", "metric", "by", "where", "names") if flags.get(_PLURAL.get(name, name))
     ]
@@ -72,6 +74,8 @@ def report(
     """The page, with the places on the map where runs fail."""
     from wallkit.pipelines.batch.places import read_places
 
+    if out is None and len(runs) == 1:
+        out = runs[0] / "report.html"
     if out is None:
         raise click.UsageError("many logs make a page of their own: say where with --out report.html")
     found = read(runs, names, flags)
@@ -84,11 +88,13 @@ def report(
 
 def read(runs: tuple[Path, ...], names: list[str], flags: dict[str, Any]) -> Runs:
     """Those of the runs that the flags ask for."""
-    from wallkit.pipelines.batch.folders import read_folders
+    from wallkit.pipelines.batch.folders import configurations_in, read_folders
     from wallkit.pipelines.batch.runs import where, with_parts_of_names
 
     if flags["truth"] is not None:
         raise click.UsageError("--truth is of one log; many logs have their truths from wallkit localize --truth")
+    if len(runs) == 1 and (inside := configurations_in(runs[0])):
+        runs, names = inside, [folder.name for folder in inside]
     found = read_folders(runs, names)
     if flags["names"]:
         found = with_parts_of_names(found, flags["names"])

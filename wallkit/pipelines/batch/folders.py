@@ -19,6 +19,13 @@ def is_folder_of_runs(folder: Path) -> bool:
     return not (folder / "run.json").is_file() and any(folder.glob("*/run.json"))
 
 
+def configurations_in(folder: Path) -> tuple[Path, ...]:
+    """The folders of result folders inside a folder that is neither: one for each configuration, by name."""
+    if not folder.is_dir() or (folder / "run.json").is_file() or is_folder_of_runs(folder):
+        return ()
+    return tuple(sorted(path for path in folder.iterdir() if path.is_dir() and is_folder_of_runs(path)))
+
+
 def read_folders(folders: Sequence[Path], names: Sequence[str]) -> Runs:
     """The runs of every configuration; a log is the result folder's name, which is the same in each of them.
 
