@@ -207,14 +207,19 @@ def test_log_info_and_convert(wallkit, tmp_path):
     assert (tmp_path / "a" / "estimate.tum").read_bytes() == (tmp_path / "b" / "estimate.tum").read_bytes()
 
 
-def test_demo_is_as_expected(wallkit, tmp_path):
-    done = wallkit("demo", "--json", "-q")
+def test_demo_is_as_expected(wallkit_from_nothing, tmp_path):
+    done = wallkit_from_nothing("demo", "--json", "-q")
     assert done.code == 0, done.out
     assert done.json["surprises"] == []
-    assert set(done.json["methods"]) == {"basic", "novelty", "class_conditional"}
-    assert (tmp_path / "wallkit-demo" / "report.html").is_file()
-    assert wallkit("demo", "-q").code == 2
-    assert wallkit("demo", "-q", "--overwrite").code == 0
+    assert done.json["map"] == "good: 0 errors, 0 warnings"
+    assert done.json["calibration"] == "PASS"
+    kept = {name: seeds[0]["kept_share"] for name, seeds in done.json["methods"].items() if "kept_share" in seeds[0]}
+    assert set(kept) == {"novelty", "wall_mask", "wall_mask, true masks", "soft_mask"}
+    assert all(0.9 < share < 1 for share in kept.values())
+    page = (tmp_path / "wallkit-demo" / "report.html").read_text(encoding="utf-8")
+    assert page.count("data:image/jpeg") == 3
+    assert done.json["conclusion"][0].split(":")[0] in page
+    assert wallkit_from_nothing("demo", "-q").code == 2
 
 
 def test_doctor_and_completion(wallkit):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from wallkit.report.compare import CompareData, Contender
@@ -31,17 +31,17 @@ COLUMNS = (
 )
 
 
-def paper_headers() -> list[str]:
+def paper_headers(columns: Sequence[Column] = COLUMNS) -> list[str]:
     """Of `paper_rows`."""
-    return ["configuration", "runs", "converged", *(column.heading for column in COLUMNS)]
+    return ["configuration", "runs", "converged", *(column.heading for column in columns)]
 
 
-def paper_rows(data: CompareData) -> list[list[str]]:
+def paper_rows(data: CompareData, columns: Sequence[Column] = COLUMNS) -> list[list[str]]:
     """A row for each configuration: name, runs, those that converged, and the columns; what is not known is a dash.
 
     Updates to converge are of the runs that did; the number of those stands beside it.
     """
-    return [[c.name, *_runs(c), *(_cell(c, column) for column in COLUMNS)] for c in data.contenders]
+    return [[c.name, *_runs(c), *(_cell(c, column) for column in columns)] for c in data.contenders]
 
 
 def _runs(contender: Contender) -> tuple[str, str]:

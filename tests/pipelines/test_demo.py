@@ -1,0 +1,45 @@
+"""The demo notices when the sample is not localized as it should be."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+
+import pytest
+
+from wallkit.pipelines import demo
+from wallkit.pipelines.demo import FILTERED, METHODS, expected_answers, run_demo, surprises
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    """Two methods, and under the name of the camera's filter one that keeps people, too."""
+    with pytest.MonkeyPatch.context() as patch:
+        broken = replace(
+            METHODS[FILTERED], words=(*METHODS[FILTERED].words, 'points.wall_mask.keep=["wall","partition","person"]')
+        )
+        patch.setattr(demo, "METHODS", {"basic": METHODS["basic"], FILTERED: broken})
+        patch.setattr(demo, "SEEDS", 2)
+        yield run_demo(tmp_path_factory.mktemp("demo") / "out")
+
+
+@pytest.fixture
+def expected():
+    """Of the two methods."""
+    every = expected_answers()
+    return {**every, "methods": {name: every["methods"][name] for name in ("basic", FILTERED)}}
+
+
+def test_a_filter_that_does_not_filter_is_noticed_however_small_the_error(found, expected):
+    said = surprises(found, expected)
+    assert said
+    assert all(line.startswith(FILTERED) and "kept_share" in line for line in said)
+
+
+def test_the_verdicts_of_map_and_calibration_are_compared(found, expected):
+    known = surprises(found, expected)
+    doubtful = replace(found, calibration=replace(found.calibration, verdict="CANNOT TELL"))
+    assert set(surprises(doubtful, expected)) - set(known) == {"calibration: is CANNOT TELL, expected PASS"}
+    other = copy.deepcopy(expected) | {"map": "good: 0 errors, 3 warnings"}
+    (line,) = set(surprises(found, other)) - set(known)
+    assert line.startswith("map: is good: 0 errors, 0 warnings")
