@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wallkit.core.polygon import POINT_IN_POLYGON, packed
+from wallkit.core.polygon import crossing_number, packed
 from wallkit.core.tiles import tiles_of
 
 SHAPE = (120, 160)
@@ -30,15 +30,10 @@ def drawn(rng):
     return found[:: int(rng.choice([1, -1]))]
 
 
-@pytest.mark.parametrize("seed", range(8))
-@pytest.mark.parametrize("method", ["crossing_number", "winding_number", "even_odd"])
-def test_tiles_answer_as_polygons_do(method, seed):
+@pytest.mark.parametrize("seed", range(20))
+def test_tiles_answer_as_polygons_do(seed):
     rng = np.random.default_rng(seed)
     held = packed(drawn(rng)[: int(rng.integers(0, 9))])
-
-    def asked(at):
-        return POINT_IN_POLYGON[method](at, held)
-
     at = rng.uniform((-10, -10), (170, 130), (20_000, 2))
     if held.edges.shape[1]:
         # beside edges, where a tile that is wrongly taken for clear would show
@@ -47,8 +42,15 @@ def test_tiles_answer_as_polygons_do(method, seed):
         on_edges = held.edges[:2, e].T * share + held.edges[2:4, e].T * (1 - share)
         at = np.concatenate([at, on_edges + rng.normal(0, 1e-3, (4000, 2)), np.round(on_edges)])
     at = np.concatenate([at, [[np.nan, 3.0], [3.0, np.inf], [-0.5, -0.5], [159.5, 119.5]]])
-    tiles = tiles_of(held, SHAPE, asked)
-    np.testing.assert_array_equal(tiles.found(at, asked), asked(at))
-    calls = []
-    tiles.found(at[:20_000], lambda rest: calls.append(len(rest)) or asked(rest))
-    assert sum(calls) < 0.75 * 20_000
+    tiles = tiles_of(held, SHAPE)
+    np.testing.assert_array_equal(tiles.found(at), crossing_number(at, held))
+    clear = tiles.touching == 0
+    assert clear.mean() > 0.3
+    np.testing.assert_array_equal(tiles.regions >= 0, clear)
+
+
+def test_more_polygons_than_a_tile_can_tell_apart_have_no_table():
+    square = [[(0, 0), (5, 0), (5, 5)]]
+    assert tiles_of(packed([square] * 64), SHAPE) is not None
+    assert tiles_of(packed([square] * 65), SHAPE) is None
+    assert tiles_of(packed([]), SHAPE).found(np.zeros((2, 2))).tolist() == [-1, -1]

@@ -41,16 +41,19 @@ def classes_in(polygons: Sequence[Polygon], names: Sequence[str], shape: tuple[i
     # a mask is drawn once for the image, not for every question
     mask = mask_from(held, shape) if method == "mask" else None
 
-    tiles: list[Tiles] = []
+    tiles: list[Tiles | None] = []
 
     def located(at: Float64Array) -> Int64Array:
-        return POINT_IN_POLYGON[method](at, held) if mask is None else looked_up(at, mask)
+        if mask is not None:
+            return looked_up(at, mask)
+        if method == "crossing_number" and not tiles and len(at) >= _MANY:
+            tiles.append(tiles_of(held, shape))
+        table = tiles[0] if tiles else None
+        return POINT_IN_POLYGON[method](at, held) if table is None else table.found(at)
 
     def classes_at(pixels: ArrayLike) -> tuple[Int64Array, Float32Array]:
         at = np.ascontiguousarray(pixels, dtype=np.float64)
-        if mask is None and not tiles and len(at) >= _MANY:
-            tiles.append(tiles_of(held, shape, located))
-        found = tiles[0].found(at, located) if tiles else located(at)
+        found = located(at)
         confidences = np.empty(len(found), dtype=np.float32)
         _name(at, labels, sure, width, height, found, confidences)
         return found, confidences
