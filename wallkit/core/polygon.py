@@ -49,31 +49,27 @@ def packed(polygons: Sequence[Sequence[ArrayLike]]) -> Polygons:
 
     A ring of fewer than three corners holds nothing.
     """
-    pieces: list[Float64Array] = []
-    starts, boxes = [0], []
-    total = 0
-    for rings in polygons:
-        box = np.array([np.inf, np.inf, -np.inf, -np.inf])
-        for number, ring in enumerate(rings):
-            corners = np.asarray(ring, dtype=np.float64).reshape(-1, 2)
-            if len(corners) < 3:
-                continue
-            ends = np.concatenate([corners[1:], corners[:1]])
-            # outlines run one way and holes the other, so that they cancel in the winding number
-            area = float(corners[:, 0] @ ends[:, 1] - corners[:, 1] @ ends[:, 0])
-            begins, ends = (corners, ends) if (area > 0) == (number == 0) else (ends, corners)
-            pieces.append(np.concatenate([begins.T, ends.T]))
-            total += len(corners)
-            if number == 0:
-                box = np.concatenate([corners.min(axis=0), corners.max(axis=0)])
-        starts.append(total)
-        boxes.append(box)
-    edges = np.zeros((5, total))
-    if pieces:
-        edges[:4] = np.concatenate(pieces, axis=1)
+    around = np.tile(np.array([np.inf, np.inf, -np.inf, -np.inf]), (len(polygons), 1))
+    rings = [(p, number, corners) for p, given in enumerate(polygons) for number, ring in enumerate(given)
+             if len(corners := np.asarray(ring, dtype=np.float64).reshape(-1, 2)) >= 3]  # fmt: skip
+    sizes = np.array([len(corners) for _, _, corners in rings], dtype=np.int64)
+    owners = np.array([p for p, _, _ in rings], dtype=np.int64)
+    firsts = np.concatenate([[0], np.cumsum(np.bincount(owners, sizes, len(polygons)))]).astype(np.int64)
+    edges = np.zeros((5, int(sizes.sum())))
+    if rings:
+        corners, begin = np.concatenate([ring for _, _, ring in rings]), np.cumsum(sizes) - sizes
+        following = np.arange(1, len(corners) + 1)
+        following[begin + sizes - 1] = begin
+        ends = corners[following]
+        areas = np.add.reduceat(corners[:, 0] * ends[:, 1] - corners[:, 1] * ends[:, 0], begin)
+        # outlines run one way and holes the other, so that they cancel in the winding number
+        outlines = np.array([number == 0 for _, number, _ in rings])
+        turned = np.repeat((areas > 0) != outlines, sizes)[:, None]
+        edges[:2], edges[2:4] = np.where(turned, ends, corners).T, np.where(turned, corners, ends).T
         rise = edges[3] - edges[1]
         edges[4] = (edges[2] - edges[0]) / np.where(rise == 0, np.inf, rise)
-    firsts, around = np.array(starts, dtype=np.int64), np.array(boxes, dtype=np.float64).reshape(-1, 4)
+        boxes = np.concatenate([np.minimum.reduceat(corners, begin), np.maximum.reduceat(corners, begin)], axis=1)
+        around[owners[outlines]] = boxes[outlines]
     bands = np.zeros((len(around), _BANDS + 1), dtype=np.int64)
     members = np.empty(_count_bands(edges, firsts, around, bands), dtype=np.int64)
     _fill_bands(edges, firsts, around, bands, members)

@@ -34,8 +34,7 @@ def _brown(points: Any, T: Any, K: Any, D: Any, limit: Any, pixels: Any, depths:
     for k in range(len(points)):
         X, Y, Z = _moved(points, T, k)
         depths[k] = Z
-        r = math.sqrt(X * X + Y * Y) / Z if Z > 0 else math.inf
-        if not r < limit:
+        if not (Z > 0 and (limit * Z) ** 2 > X * X + Y * Y):
             pixels[k, 0] = pixels[k, 1] = math.nan
             inside[k] = False
             continue
