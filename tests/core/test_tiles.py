@@ -43,7 +43,12 @@ def test_tiles_answer_as_polygons_do(seed):
         at = np.concatenate([at, on_edges + rng.normal(0, 1e-3, (4000, 2)), np.round(on_edges)])
     at = np.concatenate([at, [[np.nan, 3.0], [3.0, np.inf], [-0.5, -0.5], [159.5, 119.5]]])
     tiles = tiles_of(held, SHAPE)
-    np.testing.assert_array_equal(tiles.found(at), crossing_number(at, held))
+    labels, sure = rng.permutation(len(held) + 1), rng.uniform(0, 1, len(held) + 1).astype(np.float32)
+    found, confidences = tiles.named(at, labels, sure)
+    inside = ((at >= -0.5) & (at < (159.5, 119.5))).all(axis=1)
+    expected = crossing_number(at, held)
+    np.testing.assert_array_equal(found, np.where(inside, labels[expected], -1))
+    np.testing.assert_array_equal(confidences, np.where(inside, sure[expected], 0))
     clear = tiles.touching == 0
     assert clear.mean() > 0.3
     np.testing.assert_array_equal(tiles.regions >= 0, clear)
@@ -53,4 +58,5 @@ def test_more_polygons_than_a_tile_can_tell_apart_have_no_table():
     square = [[(0, 0), (5, 0), (5, 5)]]
     assert tiles_of(packed([square] * 64), SHAPE) is not None
     assert tiles_of(packed([square] * 65), SHAPE) is None
-    assert tiles_of(packed([]), SHAPE).found(np.zeros((2, 2))).tolist() == [-1, -1]
+    nothing = tiles_of(packed([]), SHAPE)
+    assert nothing.named(np.zeros((2, 2)), np.array([7]), np.ones(1, np.float32))[0].tolist() == [7, 7]

@@ -15,7 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from wallkit.core.polygon import Polygons, crossing_number
-from wallkit.core.types import Float64Array, Int64Array
+from wallkit.core.types import Float32Array, Float64Array, Int64Array
 
 # an edge takes up little of a tile of this side [px], and the table of a VGA image stays in a core's own cache
 _SIDE = 4
@@ -35,21 +35,32 @@ class Tiles:
     """What each tile of an image knows; the centre of its first pixel is at (0, 0), its corner at (-0.5, -0.5).
 
     Attributes:
+        shape: (height, width) of the image.
         touching: (h, w) uint64, bit p is set where an edge of polygon p passes; 0 is a clear tile.
         regions: (h, w) int32 place in `answers` of a clear tile, -1 of others.
         answers: (R,) the polygon that all of a region lies in, -1 for none.
     """
 
     polygons: Polygons
+    shape: tuple[int, int]
     touching: NDArray[np.uint64]
     regions: NDArray[np.int32]
     answers: Int64Array
 
-    def found(self, points: Float64Array) -> Int64Array:
-        """(K,) as crossing_number of the points (K, 2); those beside the image too."""
-        p, found = self.polygons, np.empty(len(points), dtype=np.int64)
-        _look_up(points, self.touching, self.regions, self.answers, p.edges, p.boxes, p.bands, p.members, found)
-        return found
+    def named(self, points: Float64Array, labels: Int64Array, sure: Float32Array) -> tuple[Int64Array, Float32Array]:
+        """(K,) the label of the polygon that each point (K, 2) lies in, by crossing_number, and how sure it is.
+
+        Beside the image that is -1 and 0.
+
+        Args:
+            labels, sure: (P + 1,) of the polygons; the last is of what none holds.
+        """
+        p, found, confidences = self.polygons, np.empty(len(points), np.int64), np.empty(len(points), np.float32)
+        packed = p.edges, p.boxes, p.bands, p.members
+        _look_up(
+            points, self.shape, self.touching, self.regions, self.answers, packed, labels, sure, found, confidences
+        )
+        return found, confidences
 
 
 def tiles_of(polygons: Polygons, shape: tuple[int, int]) -> Tiles | None:
@@ -61,7 +72,7 @@ def tiles_of(polygons: Polygons, shape: tuple[int, int]) -> Tiles | None:
     _mark(polygons.edges, polygons.starts, touching)
     middles = np.empty((touching.size, 2))
     count = _join(touching, regions, middles)
-    return Tiles(polygons, touching, regions, crossing_number(middles[:count], polygons))
+    return Tiles(polygons, shape, touching, regions, crossing_number(middles[:count], polygons))
 
 
 @njit(cache=True, nogil=True)
@@ -127,31 +138,33 @@ def _beside(row: int, column: int, regions: Any) -> int:
 @njit(cache=True, nogil=True)
 def _look_up(
     points: Any,
+    shape: Any,
     touching: Any,
     regions: Any,
     answers: Any,
-    edges: Any,
-    boxes: Any,
-    bands: Any,
-    members: Any,
+    packed: Any,
+    labels: Any,
+    sure: Any,
     found: Any,
+    confidences: Any,
 ) -> None:
-    """found[k] = the first polygon that holds point k."""
-    rows, columns = touching.shape
+    """found[k], confidences[k] = label of the first polygon that holds point k, and how sure it is."""
+    edges, boxes, bands, members = packed
+    height, width = shape
     for k in range(len(points)):
         x, y = points[k, 0], points[k, 1]
-        u, v = (x + 0.5) / _SIDE, (y + 0.5) / _SIDE
+        if not (x >= -0.5 and y >= -0.5 and x < width - 0.5 and y < height - 0.5):
+            found[k], confidences[k] = -1, 0.0
+            continue
+        i, j = int((y + 0.5) / _SIDE), int((x + 0.5) / _SIDE)
+        region = regions[i, j]
+        if region >= 0:
+            found[k], confidences[k] = labels[answers[region]], sure[answers[region]]
+            continue
         asked, every, beside = np.uint64(0), True, -1
-        # NaN is in no tile
-        if u >= 0 and v >= 0 and u < columns and v < rows:
-            i, j = int(v), int(u)
-            region = regions[i, j]
-            if region >= 0:
-                found[k] = answers[region]
-                continue
-            region = _beside(i, j, regions)
-            if region >= 0:
-                asked, every, beside = touching[i, j], False, answers[region]
+        region = _beside(i, j, regions)
+        if region >= 0:
+            asked, every, beside = touching[i, j], False, answers[region]
         p, holds = -1, -1
         while True:
             if every:
@@ -180,4 +193,4 @@ def _look_up(
                 if crossed & 1:
                     holds = p
                     break
-        found[k] = holds
+        found[k], confidences[k] = labels[holds], sure[holds]

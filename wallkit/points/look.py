@@ -106,7 +106,7 @@ def look(
     labels, confidences = np.full(total, -1), np.zeros(total, dtype=np.float32)
     shares = np.zeros((total, count), dtype=np.float32)
     if len(seen):
-        samples = 1 if not margins.any() else 1 + len(_RING)
+        samples = 1 + len(_RING) if margins.any() else 1
         places = np.empty((samples, len(seen), 2))
         _place(projection.pixels, margins, seen, _RING, places)
         found, sure = classes_at(places.reshape(-1, 2))

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from wallkit.core.polygon import POINT_IN_POLYGON, looked_up, mask_from, packed
 from wallkit.core.segmentation import BACKGROUND, Polygon, Segmentation
 from wallkit.core.tiles import Tiles, tiles_of
-from wallkit.core.types import Float32Array, Float64Array, Int64Array
+from wallkit.core.types import Float32Array, Int64Array
 from wallkit.points.look import ClassesAt
 
 # so many points make a table of tiles worth its cost
@@ -43,17 +43,14 @@ def classes_in(polygons: Sequence[Polygon], names: Sequence[str], shape: tuple[i
 
     tiles: list[Tiles | None] = []
 
-    def located(at: Float64Array) -> Int64Array:
-        if mask is not None:
-            return looked_up(at, mask)
-        if method == "crossing_number" and not tiles and len(at) >= _MANY:
-            tiles.append(tiles_of(held, shape))
-        table = tiles[0] if tiles else None
-        return POINT_IN_POLYGON[method](at, held) if table is None else table.found(at)
-
     def classes_at(pixels: ArrayLike) -> tuple[Int64Array, Float32Array]:
         at = np.ascontiguousarray(pixels, dtype=np.float64)
-        found = located(at)
+        if method == "crossing_number" and (tiles or len(at) >= _MANY):
+            if not tiles:
+                tiles.append(tiles_of(held, shape))
+            if tiles[0] is not None:
+                return tiles[0].named(at, labels, sure)
+        found = POINT_IN_POLYGON[method](at, held) if mask is None else looked_up(at, mask)
         confidences = np.empty(len(found), dtype=np.float32)
         _name(at, labels, sure, width, height, found, confidences)
         return found, confidences
