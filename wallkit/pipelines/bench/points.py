@@ -36,6 +36,8 @@ from wallkit.points.filters import FILTERS, apply_filters
 from wallkit.points.labels import labelled_scan
 from wallkit.points.look import ClassesAt, LookSettings, look, project_frame
 from wallkit.points.outlines import classes_in
+from wallkit.segment.letterbox import letterbox
+from wallkit.segment.scores import ScoreMap
 
 ROUNDS = 200
 _WIDTH, _HEIGHT = 640, 480
@@ -75,15 +77,18 @@ def time_polygons(points: int, polygons: int, corners: int) -> list[Part]:
 def time_filter(beams: int, polygons: int, corners: int, particles: int) -> list[Part]:
     """The camera filter without its network, part by part, and a whole update with and without it.
 
-    All beams land on the image. The update of both is the class-conditional filter's with as many particles.
+    All beams land on the image. The update of both is the class-conditional filter's with as many particles. The scores are
+    a grid as the default model's, which `points.look.lookup` asks unless it is told to make polygons of them.
     """
     rng, fields = np.random.default_rng(0), bench_scene(400)
     frame, view, calibration = _moment(fields, beams)
     things = [Polygon(i % 2, 0.9, (ring,)) for i, ring in enumerate(_blobs(rng, polygons, corners))]
-    T_lidar_base, class_of = np.eye(4), np.array([0, 1, 2, -1])
+    # a net's twelve classes count as three, of which the first three are the polygons'
+    T_lidar_base, class_of = np.eye(4), np.array([*(i % 3 for i in range(12)), -1])
     sharp, exact = LookSettings(lookup="crossing_number", margins=0), LookSettings(lookup="crossing_number")
     by_number = classes_in(things, _CLASSES, (_HEIGHT, _WIDTH), "crossing_number")
     by_mask = classes_in(things, _CLASSES, (_HEIGHT, _WIDTH), "mask")
+    by_scores = _scores(rng).classes_at
     located = {s: project_frame(calibration, frame, view, T_lidar_base, s) for s in (sharp, exact)}
     looked = look(located[exact], by_number, class_of, 3)
     labels = BeamLabels(frame.stamp_ns, looked.labels, _CLASSES, looked.confidences, looked.shares)
@@ -106,10 +111,12 @@ def time_filter(beams: int, polygons: int, corners: int, particles: int) -> list
         "filter: project, polygons, weights": lambda: filtered(sharp),
         "filter, with margins": lambda: filtered(exact),
         "filter, with margins, by mask": lambda: filtered(exact, by_mask),
+        "filter, with margins, by a net's scores": lambda: filtered(exact, by_scores),
         "update, basic": lambda: update(bare),
         "update, filtered": lambda: update(filtered(sharp)),
         "update, filtered with margins": lambda: update(filtered(exact)),
         "update, filtered with margins, by mask": lambda: update(filtered(exact, by_mask)),
+        "update, filtered with margins, by scores": lambda: update(filtered(exact, by_scores)),
         "polygons packed, once per image": lambda: classes_in(things, _CLASSES, (_HEIGHT, _WIDTH), "crossing_number"),
         "mask drawn, once per image": lambda: classes_in(things, _CLASSES, (_HEIGHT, _WIDTH), "mask"),
     }
@@ -170,6 +177,13 @@ def _moment(fields: FieldSet, beams: int) -> tuple[Frame, View, Calibration]:
     image = CameraImage(20_000_000, "camera", "jpeg", b"")
     view = View("/camera", image, 20_000_000, np.array([0.01, 0.0, 0.01]), 0.5, 0.5)
     return Frame(0, points, np.zeros(3)), view, calibration
+
+
+def _scores(rng: np.random.Generator) -> ScoreMap:
+    """Of twelve classes for each second pixel of an input of 192 x 256; three of the twelve are those of the bench."""
+    names = tuple(_CLASSES[i % 3] for i in range(12))
+    cells = rng.normal(0, 4, (12, 16, 12)).astype(np.float32).repeat(8, axis=0).repeat(8, axis=1)
+    return ScoreMap(names, names, letterbox((_HEIGHT, _WIDTH), (192, 256)), cells, is_probability=False)
 
 
 def _blobs(rng: np.random.Generator, polygons: int, corners: int) -> list[Float64Array]:
