@@ -12,7 +12,10 @@ import pytest
 import wallkit
 
 PACKAGE = Path(wallkit.__file__).parent
-ROOMS = ("logs", "maps", "calib", "segment", "points", "localize", "evaluate", "simulate", "dataset", "train", "report")
+ROOMS = (
+    *("logs", "maps", "calib", "segment", "points", "localize", "evaluate", "simulate", "dataset", "train", "report"),
+    "batch",
+)
 HEAVY = {
     "cv2",
     "onnxruntime",

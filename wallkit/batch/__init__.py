@@ -1,0 +1,1 @@
+"""Many runs -> one table that survives a sudden end."""
