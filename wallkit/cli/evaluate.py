@@ -77,7 +77,7 @@ def compare(
     """Put several runs side by side, with tests of significance against the first.
 
     RUN is a result folder, of one seed or several, or a folder of such folders: one configuration over several logs. A
-    folder of configurations stands for all of them.
+    folder of configurations stands for all of them, and so does that of wallkit batch.
 
     Over several logs all intervals and tests are over logs, since runs of one log are alike.
 
@@ -87,7 +87,7 @@ def compare(
       wallkit compare a/ b/ c/ -o compare.html
       wallkit compare --paper basic/ wall_mask/ soft_mask/
       wallkit compare basic/ wall_mask/ --by people --names "{scene}-{people}-{take}"
-      wallkit compare runs/ --baseline basic --metric lost_share
+      wallkit compare batch/ --baseline basic --metric lost_share
     """
     from dataclasses import asdict
 
@@ -143,8 +143,8 @@ def compare(
 def report(runs: tuple[Path, ...], truth: Path | None, out: Path | None, animate: Path | None, **flags: Any) -> None:
     """Draw the page of a run again, or one page of several, or of many logs, or how its particles gather.
 
-    Folders of result folders, one for each configuration, make the page of many logs: what differs, the worst runs, and
-    where on the map they fail.
+    The folder of a batch, or folders of result folders, one for each configuration, make the page of many logs: what
+    differs, the worst runs, and where on the map they fail.
 
     \b
     Examples:

@@ -33,15 +33,16 @@ batch_options = common.options(
 def is_for(runs: tuple[Path, ...], flags: dict[str, Any]) -> bool:
     """Whether what is named are many logs: several folders of folders, or one and an option that only makes sense there."""
     from wallkit.pipelines.batch.folders import configurations_in, is_folder_of_runs
+    from wallkit.pipelines.batch.read import is_batch
 
-    if len(runs) == 1 and configurations_in(runs[0]):
+    if len(runs) == 1 and (is_batch(runs[0]) or configurations_in(runs[0])):
         return True
     asked = [
         f"--{name}" for name in ("baseline", "metric", "by", "where", "names") if flags.get(_PLURAL.get(name, name))
     ]
     others = [run for run in runs if not is_folder_of_runs(run)]
     if asked and others:
-        message = f"{', '.join(asked)} is for folders of result folders, and {others[0]} is none"
+        message = f"{', '.join(asked)} is for a batch or folders of result folders, and {others[0]} is neither"
         raise click.UsageError(message)
     # a single folder without a question is shown as its runs
     return not others and (bool(asked) or flags["paper"] or len(runs) > 1)
@@ -89,13 +90,14 @@ def report(
 def read(runs: tuple[Path, ...], names: list[str], flags: dict[str, Any]) -> Runs:
     """Those of the runs that the flags ask for."""
     from wallkit.pipelines.batch.folders import configurations_in, read_folders
+    from wallkit.pipelines.batch.read import is_batch, read_runs
     from wallkit.pipelines.batch.runs import where, with_parts_of_names
 
     if flags["truth"] is not None:
         raise click.UsageError("--truth is of one log; many logs have their truths from wallkit localize --truth")
     if len(runs) == 1 and (inside := configurations_in(runs[0])):
         runs, names = inside, [folder.name for folder in inside]
-    found = read_folders(runs, names)
+    found = read_runs(runs[0]) if is_batch(runs[0]) else read_folders(runs, names)
     if flags["names"]:
         found = with_parts_of_names(found, flags["names"])
     for words in flags["where"]:

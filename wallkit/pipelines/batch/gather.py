@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -36,13 +36,16 @@ class Row:
     metrics: Mapping[str, float | None] = field(default_factory=dict)
 
 
-def gather(rows: Iterable[Row], labels: Mapping[str, Value]) -> Runs:
+def gather(
+    rows: Iterable[Row], labels: Mapping[str, Value], *, configurations: Sequence[str] = (), logs: Sequence[str] = ()
+) -> Runs:
     """All rows as columns; runs that another configuration has and this one has not are added as missing.
 
     Args:
         labels: unit, definition and which way is better, by metric; a metric without a label has no unit.
+        configurations, logs: their order; what is not among them comes after, as it comes.
     """
-    table = _Table()
+    table = _Table(configurations, logs)
     for row in rows:
         table.add(row)
     table.add_missing()
@@ -57,9 +60,10 @@ class _Names(dict[str, int]):
 
 
 class _Table:
-    def __init__(self) -> None:
-        self.configurations, self.logs = _Names(), _Names()
-        self.settings: list[dict[str, object]] = []
+    def __init__(self, configurations: Sequence[str], logs: Sequence[str]) -> None:
+        self.configurations = _Names((name, i) for i, name in enumerate(configurations))
+        self.logs = _Names((name, i) for i, name in enumerate(logs))
+        self.settings: dict[int, dict[str, object]] = {}
         self.pairs: dict[tuple[tuple[str, ...], int], int] = {}
         self.of_pair: list[Row] = []
         self.numbers = {name: array("q") for name in ("configuration", "log", "pair", "status", "seed")}
@@ -73,8 +77,7 @@ class _Table:
         if pair == len(self.of_pair):
             self.of_pair.append(row)
         configuration = self.configurations.number(row.configuration)
-        if configuration == len(self.settings):
-            self.settings.append(dict(row.settings))
+        self.settings.setdefault(configuration, dict(row.settings))
         for name, number in (
             ("configuration", configuration),
             ("log", self.logs.number(row.log)),
@@ -108,8 +111,11 @@ class _Table:
         return Runs(
             tuple(self.configurations), tuple(self.logs), numbers["configuration"], numbers["log"], numbers["pair"],
             numbers["status"], numbers["seed"], with_shares(columns), self._facts(numbers),
-            tuple(self.settings), tuple(self.texts["key"]), tuple(self.texts["message"]), tuple(self.texts["folder"]),
+            self._settings(), tuple(self.texts["key"]), tuple(self.texts["message"]), tuple(self.texts["folder"]),
         )  # fmt: skip
+
+    def _settings(self) -> tuple[dict[str, object], ...]:
+        return tuple(self.settings.get(number, {}) for number in range(len(self.configurations)))
 
     def _facts(self, numbers: Mapping[str, Int64Array]) -> dict[str, tuple[str, ...]]:
         """Texts by key, for the tables by a factor; a setting counts where configurations differ in it."""
@@ -118,8 +124,9 @@ class _Table:
         names = tuple(self.configurations)
         facts["seed"] = tuple(str(seed) for seed in numbers["seed"].tolist())
         facts["configuration"] = tuple(names[i] for i in numbers["configuration"].tolist())
-        for key in dict.fromkeys(key for settings in self.settings for key in settings):
-            values = [setting_text(settings.get(key)) for settings in self.settings]
+        found = self._settings()
+        for key in dict.fromkeys(key for settings in found for key in settings):
+            values = [setting_text(settings.get(key)) for settings in found]
             if len(set(values)) > 1:
                 facts[key] = tuple(values[i] for i in numbers["configuration"].tolist())
         return facts
