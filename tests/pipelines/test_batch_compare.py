@@ -152,7 +152,7 @@ def test_patterns_that_do_not_fit():
     with pytest.raises(WallkitError, match="names no part"):
         with_parts_of_names(runs, "place-people")
     assert [name for name, _ in levels_of(runs, "crowd")] == ["0", "2", "12"]
-    assert [setting_text(v) for v in (["a", "b"], [], None, 0.1)] == ["a+b", "none", "default", "0.1"]
+    assert [setting_text(v) for v in (["a", "b"], [], None, 0.1234567)] == ["a+b", "none", "default", "0.1235"]
     assert sorted(["b12", "b2", "10", "9", "a"], key=natural) == ["9", "10", "a", "b2", "b12"]
 
 

@@ -28,6 +28,7 @@ def batch(tmp_path):
         Asked(
             f"{r.log}/{r.configuration}/seed-{r.seed}", r.key, "localize", f"logs/{r.log}/log.mcap", "floor.yaml", "",
             r.configuration, r.seed, "1.0", {} if r.configuration == "basic" else {"points.filters": ["soft_mask"]},
+            {"log": r.log, "floor": r.log.split("-")[1]},
         )
         for r in rows
     ]  # fmt: skip
@@ -48,6 +49,7 @@ def test_the_table_is_what_was_kept(batch):
     assert runs.logs[:3] == ("hall-0-1", "hall-0-2", "hall-2-1")
     assert [int((runs.status == s).sum()) for s in (DONE, FAILED, MISSING)] == [46, 1, 1]
     assert runs.facts["points.filters"][0] in ("soft_mask", "default")
+    assert set(runs.facts["floor"]) == {"0", "2", "12"}
     assert set(runs.facts["map"]) == {"floor.yaml"}
     assert runs.column("error_mean_m").label.unit == "m"
     assert runs.column("availability").label.better == "higher"

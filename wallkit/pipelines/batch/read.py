@@ -62,7 +62,7 @@ def _rows(folder: Path, names: Mapping[str, str]) -> Iterator[Row]:
         yield Row(
             asked.name, asked.configuration, log, inputs, asked.seed, _STATUS[came.status],
             "" if is_done else came.message, str(folder / row.folder) if row.folder else "",
-            {"job": asked.job, "verdict": came.verdict}, asked.settings, {**came.metrics, **own} if is_done else {},
+            {"job": asked.job, "verdict": came.verdict, **asked.tags}, asked.settings, {**came.metrics, **own} if is_done else {},
         )  # fmt: skip
 
 

@@ -176,10 +176,10 @@ def levels_of(runs: Runs, key: str) -> list[tuple[str, BoolArray]]:
 
 
 def setting_text(value: object) -> str:
-    """A setting as a word; a list is its parts, an empty one `none`, and what is not set `default`."""
+    """A setting as a word; a list is its parts, an empty one `none`, what is not set `default`."""
     if isinstance(value, list | tuple):
         return "+".join(str(part) for part in value) or "none"
-    return "default" if value is None else str(value)
+    return "default" if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def natural(text: str) -> tuple[tuple[int, float, str], ...]:
