@@ -132,8 +132,8 @@ def compare(
 @click.option(
     "--animate",
     type=click.Path(path_type=Path),
-    metavar="FILE.gif",
-    help="Its particles at a few moments, and no page.",
+    metavar="FILE",
+    help="Its particles as a .gif or .mp4 (extra [video]), and no page.",
 )
 @read_batch.batch_options
 @common.config_option
@@ -151,7 +151,7 @@ def report(runs: tuple[Path, ...], truth: Path | None, out: Path | None, animate
       wallkit report log.wallkit --truth mocap.tum -o with-truth.html
       wallkit report a/ b/ --out report.html
       wallkit report basic/ wall_mask/ --names "{scene}-{people}-{take}" --by people -o report.html
-      wallkit report log.wallkit --animate cloud.gif
+      wallkit report log.wallkit --animate cloud.mp4
     """
     from wallkit.pipelines.report import compare_runs, write_compare_report, write_run_report
 
@@ -164,7 +164,7 @@ def report(runs: tuple[Path, ...], truth: Path | None, out: Path | None, animate
 
         if len(runs) > 1 or out is not None:
             raise click.UsageError("--animate draws one run, and nothing else")
-        moments = write_animation(animate, load_seeds(runs[0], settings, truth)[0][0])
+        moments = write_animation(animate, load_seeds(runs[0], settings, truth)[0][0], runs[0])
         click.echo(f"animated {animate}: {moments} moments")
         return
     if len(runs) == 1:

@@ -1,32 +1,77 @@
-"""A run's snapshots -> a GIF over the ceiling it was localized by, or over its map."""
+"""A run's particles -> a GIF or an MP4 over the ceiling it was localized by, or over its map."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
+from wallkit.core.types import Health, Int64Array, PointCloud
 from wallkit.errors import WallkitError
+from wallkit.logs.reader import open_log
 from wallkit.maps.ceiling.files import read_ceiling
 from wallkit.pipelines.outputs import write_whole
-from wallkit.pipelines.run_folder import RunRecord
-from wallkit.report.animate import animation, ground_of_ceiling, ground_of_grid
+from wallkit.pipelines.run_folder import RESULT_MCAP, RunRecord
+from wallkit.report.animate import Ground, animation, film, ground_of_ceiling, ground_of_grid
+from wallkit.report.data import Snapshot
+
+_CLOUDS = "/wallkit/particles/cloud"
+_FORMS = {".gif": animation, ".mp4": film}
+# moments shown at most, of which the first ones, when impossible particles die, are neighbours
+_MOMENTS = {".gif": 60, ".mp4": 240}
 
 
-def write_animation(out: Path, record: RunRecord) -> int:
-    """Writes the GIF; how many moments it shows.
+def write_animation(out: Path, record: RunRecord, folder: Path) -> int:
+    """Writes it; how many moments it shows. They come from result.mcap, else they are the few kept for the report.
+
+    Args:
+        folder: of the run.
 
     Raises:
-        WallkitError: the run kept no particles, or neither its ceiling nor its map is there.
+        WallkitError: the run kept no particles, neither its ceiling nor its map is there, or it can be no such file.
     """
-    if not record.snapshots:
+    form = out.suffix.lower()
+    if form not in _FORMS:
+        raise WallkitError(f"'{out.suffix}' is no animation", where=out, hint="name a file that ends in .gif or .mp4")
+    moments = recorded(folder, record, _MOMENTS[form]) or record.snapshots
+    if not moments:
         raise WallkitError("the run kept no particles", where=record.name, hint="run wallkit localize with one seed")
+    write_whole(out, _FORMS[form](_ground(record), moments, record.steps.trajectory, record.truth))
+    return len(moments)
+
+
+def recorded(folder: Path, record: RunRecord, most: int) -> tuple[Snapshot, ...]:
+    """Particles of a run's result.mcap at the first updates and evenly over the rest; none if it holds none."""
+    if not (folder / RESULT_MCAP).is_file():
+        return ()
+    log = open_log([folder / RESULT_MCAP])
+    count = sum(channel.topic == _CLOUDS for _, _, channel, _ in log.raw([_CLOUDS]))
+    wanted = set(chosen(count, most).tolist())
+    shots = []
+    for i, message in enumerate(log.messages([_CLOUDS])):
+        if i in wanted and isinstance(cloud := message.value, PointCloud):
+            poses = cloud.points_m.astype(np.float64) * (1, 1, 0)
+            row = min(int(np.searchsorted(record.steps.stamps_ns, message.stamp_ns)), len(record.steps) - 1)
+            health = Health(int(record.steps.health[row])).name
+            weights = np.full(len(poses), 1 / max(len(poses), 1))
+            shots.append(Snapshot(message.stamp_ns, poses, weights, f"update {i + 1}  {health}"))
+    return tuple(shots)
+
+
+def chosen(count: int, most: int) -> Int64Array:
+    """Which of so many moments are shown: the first quarter of `most` one by one, then evenly to the last."""
+    if count <= most:
+        return np.arange(count)
+    first = most // 4
+    return np.concatenate([np.arange(first), np.linspace(first, count - 1, most - first).round().astype(np.int64)])
+
+
+def _ground(record: RunRecord) -> Ground:
     named = record.run.get("ceiling")
     if named and Path(named).is_file():
-        ground = ground_of_ceiling(read_ceiling(Path(named)))
-    elif record.grid is not None:
-        ground = ground_of_grid(record.grid)
-    else:
-        raise WallkitError(
-            "neither its ceiling nor its map is there to draw on", where=record.name, hint="run wallkit localize again"
-        )
-    write_whole(out, animation(ground, record.snapshots, record.steps.trajectory, record.truth))
-    return len(record.snapshots)
+        return ground_of_ceiling(read_ceiling(Path(named)))
+    if record.grid is not None:
+        return ground_of_grid(record.grid)
+    raise WallkitError(
+        "neither its ceiling nor its map is there to draw on", where=record.name, hint="run wallkit localize again"
+    )
