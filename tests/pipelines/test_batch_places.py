@@ -43,7 +43,7 @@ def test_means_by_square_with_each_run_once(tmp_path):
     runs = runs_in(tmp_path, [("a", "hall-1", 0), ("b", "hall-2", 0), ("d", "hall-1", 1), ("c", "lab-1", 0)])
     hall, lab = read_places(runs, EvaluateSettings())
     assert (hall.name, hall.runs, hall.logs, hall.unread) == ("hall", 2, 2, 1)
-    assert (lab.name, lab.runs, lab.unread) == ("map", 1, 0)
+    assert (lab.name, lab.runs, lab.unread) == ("lab-1", 1, 0)
     assert hall.cell_m == 0.1
     assert hall.cells.tolist() == [[0, 0], [40, 0]]
     assert hall.error_m == pytest.approx([0.3, 1.0])

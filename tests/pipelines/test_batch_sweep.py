@@ -59,6 +59,21 @@ def test_only_what_is_not_beaten_in_both_is_on_the_front():
     assert {t.name: t.cost for t in data.trades}["n=500 s=0.3"] == pytest.approx(5.0)
 
 
+def test_a_few_drawn_values_are_grouped_too():
+    numbers = {f"run-{i}": x for i, x in enumerate((0.1, 0.2, 0.5, 0.7, 0.8, 0.95))}
+    rows = [
+        replace(row, settings={"localize.sensor.sigma": numbers[row.configuration]})
+        for row in drawn_rows({name: 1.0 + x for name, x in numbers.items()})
+        if row.seed == 0 and row.log.startswith("hall")
+    ]
+    (effect,) = compare_batch(gather(rows, labels_of_runs()), Question(), title="random").effects
+    assert [(text, count) for text, count, _ in effect.levels] == [
+        ("0.1 to 0.2", 2),
+        ("0.5 to 0.7", 2),
+        ("0.8 to 0.95", 2),
+    ]
+
+
 def test_of_many_configurations_only_the_better_get_a_sentence():
     gains = {"basic": 1.0, **{f"worse-{i}": 1.5 for i in range(12)}, "same": 1.0, "better": 0.5}
     data = compare_batch(gather(drawn_rows(gains), labels_of_runs()), Question(), title="night")

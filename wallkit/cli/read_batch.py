@@ -152,6 +152,7 @@ def _question(flags: dict[str, Any], *, is_paper: bool) -> Question:
 
 
 def _sentences(data: BatchData) -> Iterator[str]:
+    from wallkit.report import batch_tables as tables
     from wallkit.report import batch_words as words
 
     for key, differences in data.differences.items():
@@ -162,6 +163,8 @@ def _sentences(data: BatchData) -> Iterator[str]:
     if len(data.summaries) > 1 and data.contest is not None:
         yield ""
         yield from words.contest_lines(data.contest, data.key)
+        if data.effects and (candidates := tables.candidate_table(data)):
+            yield _text(candidates)
     if data.worst:
         yield ""
         yield "worst runs:"

@@ -157,7 +157,7 @@ class Paired:
         mean_a, mean_b: over the paired runs, every log counting alike.
         difference: b - a in the metric's unit. percent: of a's mean; None where that has no meaning (shares, a of zero).
         middle: median over the units of the change in per cent of a: what the test is about, where few logs decide the mean.
-        p_value: two-sided, of this comparison alone. p_holm: corrected for all that were made at once.
+        p_value: two-sided, of this comparison alone. p_holm: corrected for all that were made at once, `tests` of them.
         units: how many independent things were compared. over: what they are.
         pairs: runs that have a partner. alone_a, alone_b: runs with the number that have none.
         b_better, a_better: on how many units. with_mean: on how many the difference has the sign of its mean.
@@ -181,3 +181,4 @@ class Paired:
     a_better: int
     with_mean: int
     better: Literal["a", "b", "neither"]
+    tests: int = 1

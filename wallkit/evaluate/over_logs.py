@@ -102,7 +102,7 @@ def corrected(found: Sequence[Paired], better: str) -> list[Paired]:
     p_holm = dict(zip(known, holm([float(found[i].p_value or 0.0) for i in known]), strict=True))
     label = Value("", None, "", "", "higher" if better == "higher" else "lower" if better else "")
     return [
-        replace(c, p_holm=p_holm.get(i), better=_better(label, c.difference, p_holm.get(i)))
+        replace(c, tests=len(known), p_holm=p_holm.get(i), better=_better(label, c.difference, p_holm.get(i)))
         for i, c in enumerate(found)
     ]
 

@@ -92,7 +92,8 @@ def difference_line(difference: Difference, key: str, baseline: str) -> str:
         rows = f"{word} {_most(found)} than with {baseline} ({_middle(found)}{_p_text(found)})"
         but = f"the mean, {_size(found, number)} {side} with a {_interval(found, number)}, is decided by a few"
         return f"{name}: {rows}; {but}{_left_out(found, name, baseline)}"
-    least = 2.0 ** (1 - found.units)
+    # what all logs agreeing would give
+    least = min(1.0, 2.0 ** (1 - found.units) * found.tests)
     few = f" (too few: p cannot be below {least:.2g})" if least >= _SIGNIFICANT_P and found.units > 1 else ""
     how_sure = f"{_interval(found, number)}, {_how_sure(found)}{few}{_left_out(found, name, baseline)}"
     return f"{name}: no difference from {baseline} can be told: {size}, {how_sure}"
@@ -143,8 +144,10 @@ def verdict_lines(data: BatchData) -> list[str]:
     worse = [d.name for d in differences if d.found is not None and d.found.better == "a"]
     parts = [f"{side} than {data.baseline}: {', '.join(n)}" for side, n in (("Better", better), ("worse", worse)) if n]
     said = "; ".join(parts) or f"By {word_of(data.key)} no configuration can be told from {data.baseline}"
-    is_sole = data.contest is not None and sum(c.may_be for c in data.contest.candidates) == 1
-    best = contest_lines(data.contest, data.key)[:1] if is_sole else []
+    able = [c.name for c in data.contest.candidates if c.may_be] if data.contest else []
+    # all pairs at once tell less apart than the comparisons with the baseline: no line that seems to deny the first
+    is_told = len(able) < len(data.summaries) and not (better and data.baseline in able)
+    best = contest_lines(data.contest, data.key)[:1] if data.contest and is_told else []
     return [f"{said[0].upper()}{said[1:]}.", *best, *absent]
 
 

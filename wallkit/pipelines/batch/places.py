@@ -134,7 +134,7 @@ class _Ground:
         alike = itertools.takewhile(
             lambda letters: len(set(letters)) == 1, zip(*(logs[i] for i in self.logs), strict=False)
         )
-        shared = "".join(letters[0] for letters in alike).rstrip("-_. ") if len(self.logs) > 1 else ""
+        shared = "".join(letters[0] for letters in alike).rstrip("-_. ")
         (table,) = self.rows
         cells, passes = table[:, :2].astype(np.int64), table[:, 2]
         return Places(

@@ -58,11 +58,12 @@ def _rows(folder: Path, names: Mapping[str, str]) -> Iterator[Row]:
         log = names[_subject(asked)]
         inputs = (log, asked.map, asked.calibration, asked.job)
         is_done = came.status == "done"
+        tags = {"job": asked.job, "verdict": came.verdict, **asked.tags}
         own = {"ended_well": float(came.exit_code == 0), "run_s": came.seconds, "run_cpu_s": came.cpu_s}
         yield Row(
             asked.name, asked.configuration, log, inputs, asked.seed, _STATUS[came.status],
             "" if is_done else came.message, str(folder / row.folder) if row.folder else "",
-            {"job": asked.job, "verdict": came.verdict, **asked.tags}, asked.settings, {**came.metrics, **own} if is_done else {},
+            tags, asked.settings, {**came.metrics, **own} if is_done else {},
         )  # fmt: skip
 
 

@@ -76,13 +76,15 @@ def _effect(
 def _groups(texts: Sequence[str]) -> list[tuple[str, BoolArray]]:
     """Values of a setting and which configurations have them; many numbers are grouped by size."""
     levels = sorted(set(texts), key=natural)
-    if len(levels) <= _MOST_LEVELS:
+    # values that were drawn hardly ever come twice
+    is_drawn = 3 < len(texts) < 2 * len(levels)
+    if len(levels) <= _MOST_LEVELS and not is_drawn:
         return [(level, np.array([text == level for text in texts])) for level in levels]
     try:
         numbers = np.array([float(text) for text in texts])
     except ValueError:
         return []
-    edges = np.quantile(numbers, np.linspace(0, 1, _GROUPS + 1))
+    edges = np.quantile(numbers, np.linspace(0, 1, min(_GROUPS, len(levels) // 2) + 1))
     index = np.searchsorted(edges[1:-1], numbers, side="right")
     return [
         (f"{numbers[index == i].min():.3g} to {numbers[index == i].max():.3g}", np.asarray(index == i))
