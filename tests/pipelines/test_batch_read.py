@@ -87,5 +87,17 @@ def test_one_log_on_two_maps_is_one_log_and_two_partners(tmp_path):
     runs = read_runs(tmp_path)
     assert runs.logs == ("logs/hall.mcap",)
     assert sorted(zip(runs.configuration.tolist(), runs.pair.tolist(), strict=True)) == [(0, 0), (0, 1), (1, 0), (1, 1)]
+    # of a job that does not localize: how often it ended well, and every number it has
+    with open_store(tmp_path) as store:
+        for m in ("old", "new"):
+            for c in ("a", "b"):
+                store.add(Outcome(f"{m}{c}", "done", "PASS", int(c == "b" and m == "old"), "", {"places": 7.0}))
+    lines = CliRunner().invoke(main, ["compare", str(tmp_path)]).output.splitlines()
+    assert "mean share of runs that end well" in lines[0]
+    assert [line.split()[:6] for line in lines[1:3]] == [
+        ["a", "2", "0", "0", "100.0", "%"],
+        ["b", "2", "0", "0", "50.0", "%"],
+    ]
+    assert "places" in lines[4]
     with pytest.raises(WallkitError, match="batch of wallkit"):
         read_runs(tmp_path / "gone")

@@ -37,9 +37,10 @@ def error_table(data: BatchData) -> Table:
 
 def other_table(data: BatchData) -> Table:
     """A row for each configuration: how often it held, and what it cost. Columns that no run has are left out."""
-    keys = [k for k in _OTHERS if any(k in s.numbers for s in data.summaries)]
+    known = dict.fromkeys(k for s in data.summaries for k in s.numbers if k != data.key)
+    keys = [k for k in _OTHERS if k in known or k == data.key] if "error_mean_m" in data.labels else list(known)
     rows = [[s.name, *(_mean_cell(s.numbers.get(key)) for key in keys)] for s in data.summaries]
-    return ["configuration", *(_OTHERS[key] for key in keys)], rows
+    return ["configuration", *(_OTHERS.get(key, key) for key in keys)], rows
 
 
 def paper_table(summaries: Sequence[Summary]) -> Table:

@@ -17,6 +17,7 @@ WORDS = {
     "peak_memory_mb": "peak memory",
     "updates_to_converge": "updates to converge",
     "lost_share": "share of scans lost",
+    "ended_well": "share of runs that end well",
     "was_lost": "share of runs ever lost",
     "converged": "share of runs converged",
     "was_false_healthy": "share of runs false healthy",

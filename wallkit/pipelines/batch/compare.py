@@ -32,7 +32,7 @@ SHOWN = (
     "cpu_percent",
     "peak_memory_mb",
 )
-MAIN = "error_mean_m"
+MAIN, WELL = "error_mean_m", "ended_well"
 _WORST = 20
 Differences = Mapping[str, tuple[Difference, ...]]
 
@@ -63,11 +63,13 @@ def compare_batch(runs: Runs, question: Question, *, title: str) -> BatchData:
             where=title,
             hint="start the batch again",
         )
-    metrics = question.metrics or ((MAIN,) if MAIN in runs.columns else tuple(runs.columns)[:1])
+    metrics = question.metrics or tuple(key for key in (MAIN, WELL, *runs.columns) if key in runs.columns)[:1]
     labels = {key: runs.column(key).label for key in metrics}
     base = index_of(runs, question.baseline) if question.baseline else 0
     rng = np.random.default_rng(np.random.SeedSequence(question.seed))
-    shown = (*metrics, *(key for key in SHOWN if key in runs.columns and key not in metrics))
+    # of jobs that do not localize, everything
+    usual = SHOWN if MAIN in runs.columns else tuple(runs.columns)
+    shown = (*metrics, *(key for key in usual if key in runs.columns and key not in metrics))
     main = metrics[0]
     summaries = _summaries(rng, runs, shown)
     factors = tuple(Factor(key, _levels(rng, runs, key, base, metrics, shown)) for key in question.by)

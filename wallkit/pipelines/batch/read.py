@@ -55,7 +55,8 @@ _BETTER: Mapping[str, Any] = {"lower": "lower", "higher": "higher"}
 def _rows(folder: Path, names: Mapping[str, str]) -> Iterator[Row]:
     for row in store.read_rows(folder):
         asked, came = row.asked, row.outcome
-        log = names[_subject(asked)]
+        # a batch that is planned anew meanwhile may have others
+        log = names.get(_subject(asked), _subject(asked))
         inputs = (log, asked.map, asked.calibration, asked.job)
         is_done = came.status == "done"
         tags = {"job": asked.job, "verdict": came.verdict, **asked.tags}
