@@ -96,4 +96,4 @@ def test_many_values_are_grouped_by_size():
     assert [count for _, count, _ in effect.levels] == [4] * 5
     means = [mean.value for _, _, mean in effect.levels]
     assert means == sorted(means)
-    assert effect.levels[0][0].startswith(f"{min(numbers.values()):.3g} to ")
+    assert effect.levels[0][0].startswith(f"{min(numbers.values()):.4g} to ")

@@ -306,7 +306,7 @@ def _effect(axes: Axes, effect: Effect, ends: Sequence[float], data: BatchData, 
     ticks = {t: _tick(t, data.unit) if is_first else "" for t in canvas.linear_ticks(low, high, count=4)}
     canvas.draw_ticks(axes, "y", ticks)
     canvas.draw_ticks(
-        axes, "x", {float(i): _short(text, 11) for i, (text, _, _) in enumerate(effect.levels)}, effect.key
+        axes, "x", {float(i): _short(text, 16) for i, (text, _, _) in enumerate(effect.levels)}, effect.key
     )
     axes.annotate(
         f"{effect.span_percent:.0f} % between best and worst",

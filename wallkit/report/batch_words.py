@@ -149,7 +149,9 @@ def verdict_lines(data: BatchData) -> list[str]:
     # all pairs at once tell less apart than the comparisons with the baseline: no line that seems to deny the first
     is_told = len(able) < len(data.summaries) and not (better and data.baseline in able)
     best = contest_lines(data.contest, data.key)[:1] if data.contest and is_told else []
-    return [f"{said[0].upper()}{said[1:]}.", *best, *absent]
+    # of a sweep the first is an arbitrary point, which nobody asked about
+    first = [] if best and not parts else [f"{said[0].upper()}{said[1:]}."]
+    return [*first, *best, *absent]
 
 
 def run_lines(runs: Sequence[OneRun], what: str) -> Iterator[str]:

@@ -87,6 +87,6 @@ def _groups(texts: Sequence[str]) -> list[tuple[str, BoolArray]]:
     edges = np.quantile(numbers, np.linspace(0, 1, min(_GROUPS, len(levels) // 2) + 1))
     index = np.searchsorted(edges[1:-1], numbers, side="right")
     return [
-        (f"{numbers[index == i].min():.3g} to {numbers[index == i].max():.3g}", np.asarray(index == i))
+        (f"{numbers[index == i].min():.4g} to {numbers[index == i].max():.4g}", np.asarray(index == i))
         for i in sorted(set(index.tolist()))
     ]
