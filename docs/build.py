@@ -22,6 +22,8 @@ from wallkit.core.config import name_in
 from wallkit.maps.rules import RULES
 from wallkit.maps.rules.base import PREREQUISITES, Rule
 from wallkit.maps.rules.docs import doc_of, is_file
+from wallkit.pipelines.batch.expand import Sweep
+from wallkit.pipelines.batch.manifest import Manifest
 from wallkit.pipelines.config import Config
 from wallkit.simulate.scenario import Scenario
 
@@ -79,6 +81,41 @@ def scenario_page() -> str:
         " Every key can also be given as `--set KEY=VALUE`. What is a list of tables is written `[[doors]]` once for each."
     )
     return "\n".join(["# Scenarios", "", NOTE, "", intro, *_settings(Scenario, (), 2)]) + "\n"
+
+
+def manifest_page() -> str:
+    """Everything that the manifest of a batch can say."""
+    intro = (
+        "What `wallkit batch MANIFEST` runs: every log x map x calibration x configuration x seed. Paths are from the"
+        " manifest's folder; `beside:NAME` is a file in the folder of each log. How to write one: [Run many"
+        " logs](../how-to/run-many-logs.md)."
+    )
+    tables = (
+        (
+            "settings",
+            'for all configurations, as in `wallkit.toml`: `[settings.localize]`, or `"localize.particles" = 500`',
+        ),
+        (
+            "[configurations]",
+            "one for each: `name`, `settings = {...}` over those for all, and `model` instead of the manifest's",
+        ),
+    )
+    rows = [(f"`[{name}]`", meaning) for name, meaning in tables]
+    over = (
+        '`[sweep.over]` names what is varied: `"localize.particles" = [200, 500, 1000]`, and for random and sobol also'
+        " ranges, `{low = 100, high = 5000, log = true, integer = true}`. With `[[configurations]]` each of them is swept."
+    )
+    lines = [
+        "# Manifests of a batch",
+        "",
+        NOTE,
+        "",
+        intro,
+        *_settings(Manifest, (), 2),
+        "",
+        *_table(("table", "meaning"), rows),
+    ]
+    return "\n".join([*lines, "", "## `[sweep]`", *_settings(Sweep, (), 3), "", over]) + "\n"
 
 
 def _settings(cls: type[Any], key: tuple[str, ...], level: int) -> Iterator[str]:
@@ -203,7 +240,13 @@ def _with_rule(headers: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[tu
     return [headers, tuple("---" for _ in headers), *rows]
 
 
-PAGES = {"cli.md": cli_page, "config.md": config_page, "map-rules.md": rules_page, "scenario.md": scenario_page}
+PAGES = {
+    "cli.md": cli_page,
+    "config.md": config_page,
+    "map-rules.md": rules_page,
+    "scenario.md": scenario_page,
+    "batch.md": manifest_page,
+}
 
 
 def main(is_check: bool) -> int:

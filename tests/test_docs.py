@@ -132,7 +132,7 @@ def test_the_readme_names_every_command():
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_every_setting_that_is_named_exists(page):
     """Settings of one alternative of a part (localize.sensor.beams) are in the reference, but not among the defaults."""
-    pages = ("config.md", "scenario.md")
+    pages = ("config.md", "scenario.md", "batch.md")
     reference = "".join((ROOT / "docs/reference" / name).read_text(encoding="utf-8") for name in pages)
     named = {key for found in SETTING.findall(page.read_text(encoding="utf-8")) for key in found if key}
     # the setting that the guide's own sensor model brings along
@@ -222,7 +222,7 @@ def test_the_readmes_test_command_installs_what_the_tests_need():
     *_, install, test = readme_command("pytest -q")
     assert (install, test) == ("pip install '.[test]'", "pytest -q")
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert {"pytest", "pytest-xdist", "ezdxf", "mujoco", "hypothesis", "onnx", "ruff", "mypy"} == {
+    assert {"pytest", "pytest-xdist", "ezdxf", "mujoco", "hypothesis", "onnx", "ruff", "mypy", "dask", "distributed"} == {
         re.split(r"[<>=]", name)[0] for name in project["optional-dependencies"]["test"]
     }
 

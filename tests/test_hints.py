@@ -16,7 +16,7 @@ from wallkit.cli.app import main
 PACKAGE = Path(wallkit.__file__).parent
 _COMMAND = re.compile(r"\bwallkit((?: [a-z][a-z-]*)+)([^;`]*)")
 # what is told of another program, up to the end of the sentence
-_OTHERS = re.compile(r"\b(?:apt-get|pip) [^;]*")
+_OTHERS = re.compile(r"\b(?:apt-get|pip|dask) [^;]*")
 # commands and flags of rooms that are being built; each goes from here when it lands
 COMING = {
     "calib from-urdf",

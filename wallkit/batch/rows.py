@@ -15,8 +15,8 @@ class Asked:
 
     Attributes:
         name: readable and unique in the batch, parts with '/' between: LOG/CONFIGURATION/seed-N.
-        key: hash of the content of its inputs, its settings, its seed and the version of wallkit: the same key, the same
-            result.
+        key: hash of its name, the content of its inputs, its settings, its seed and the version of wallkit: the same key,
+            the same result.
         job: "localize", "calib verify", "map audit" or "simulate".
         log, map, calibration: the files, as named from where the manifest lies; "" where the job has none.
         tags: what the manifest says of the log: {"people": "4"}.

@@ -7,7 +7,8 @@ The file is `batch.sqlite` in the batch's folder:
               works. `planned` is 0 for runs of an earlier manifest that the last one no longer asks for: they are kept,
               and count again when it does.
     measures  unit, definition and better direction of every metric, and whether it is a time
-    about     schema, version of wallkit, the manifest's text, and under 'swept' the settings that a sweep varies
+    about     schema, version of wallkit, the manifest's text, the names of its configurations in their order,
+              and under 'swept' the settings that a sweep varies
 
 A rollback journal and not a write-ahead log: the folder may be on a network file system, where the latter does not work
 (https://sqlite.org/wal.html).
@@ -161,7 +162,7 @@ def read_measures(folder: Path) -> dict[str, Measure]:
 
 
 def read_about(folder: Path) -> dict[str, Any]:
-    """The table `about`: "schema", "wallkit", "manifest" and "swept".
+    """The table `about`: "schema", "wallkit", "manifest", "configurations" and "swept".
 
     Raises:
         WallkitError: see read_rows.

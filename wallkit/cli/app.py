@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 import wallkit
+from wallkit.cli.batch import batch
 from wallkit.cli.bench.group import bench
 from wallkit.cli.calib.group import calib
 from wallkit.cli.ceiling import ceiling
@@ -38,7 +39,7 @@ def main() -> None:
 
 COMMANDS = (
     *(demo, log, map_group, calib, ceiling, model, localize, evaluate, compare, report, simulate, dataset),
-    *(bench, config, completion, doctor),
+    *(batch, bench, config, completion, doctor),
 )
 for command in COMMANDS:
     main.add_command(command)

@@ -62,7 +62,7 @@ def load_config(path: Path | None, words: Sequence[str] = (), flags: dict[str, A
         path = DEFAULT_FILE
     sources: list[Source] = []
     if path is not None:
-        sources.append(_with_files_beside(read_toml(path), path))
+        sources.append(with_files_beside(read_toml(path), path))
     sources.append(source_from_words(words))
     for key, (value, flag) in (flags or {}).items():
         if value is not None:
@@ -71,7 +71,7 @@ def load_config(path: Path | None, words: Sequence[str] = (), flags: dict[str, A
     return LoadedConfig(config, origins, path)
 
 
-def _with_files_beside(source: Source, path: Path) -> Source:
+def with_files_beside(source: Source, path: Path) -> Source:
     """The source with its map, model and cache named from here, not from the file's folder."""
     table = _beside(_beside(source.table, "map", path), "ceiling", path)
     if isinstance(table.get("segment"), dict):

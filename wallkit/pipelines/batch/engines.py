@@ -1,0 +1,200 @@
+"""Pieces of a batch -> their outcomes, by processes of this machine or by a Dask cluster: nothing here schedules."""
+
+from __future__ import annotations
+
+import itertools
+import multiprocessing
+import os
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+from typing import Any
+
+import wallkit
+from wallkit.batch.rows import Outcome
+from wallkit.errors import WallkitError
+from wallkit.pipelines.batch.plan import Task
+from wallkit.pipelines.batch.work import do_piece, failed, found_done
+
+Piece = tuple[Task, ...]
+Engine = Callable[[Iterator[Piece]], Iterator[list[Outcome]]]
+
+# pieces that are handed out before they are needed, for each process: the driver holds no more
+_AHEAD = 2
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+def local_engine(jobs: int) -> Engine:
+    """Processes of this machine, one thread each; one that dies takes one run with it, not the batch."""
+
+    def run(pieces: Iterator[Piece]) -> Iterator[list[Outcome]]:
+        for name in _THREADS:
+            os.environ.setdefault(name, "1")
+        broken: list[Piece] = []
+        yield from _through_pool(pieces, jobs, broken)
+        # whichever of them it was that killed its process: one at a time it can only be that one
+        while broken:
+            piece = broken.pop()
+            again: list[Piece] = []
+            yield from _through_pool(iter([piece]), 1, again)
+            if again:
+                outcomes, rest = without_killer(piece)
+                yield outcomes
+                broken += [rest] if rest else []
+
+    return run
+
+
+def without_killer(piece: Piece) -> tuple[list[Outcome], Piece]:
+    """What is known of a piece whose process died: the runs before are done, the next one killed it, the rest is left."""
+    known = list(itertools.takewhile(lambda pair: pair[1] is not None, ((task, found_done(task)) for task in piece)))
+    outcomes = [outcome for _, outcome in known if outcome is not None]
+    if len(known) < len(piece):
+        message = "the process that ran it ended suddenly, out of memory perhaps"
+        outcomes.append(failed(piece[len(known)], message))
+    return outcomes, piece[len(known) + 1 :]
+
+
+def _through_pool(pieces: Iterator[Piece], jobs: int, broken: list[Piece]) -> Iterator[list[Outcome]]:
+    """Outcomes as they come; pieces of a pool that breaks are left in `broken`."""
+    # a fresh process: neither OpenGL nor the threads of libraries survive a fork
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_begin)
+    running: dict[Future[list[Outcome]], Piece] = {}
+    before = set(multiprocessing.active_children())
+    try:
+        while True:
+            for piece in itertools.islice(pieces, max(0, _AHEAD * jobs - len(running))):
+                running[pool.submit(do_piece, piece, wallkit.__version__)] = piece
+            if not running:
+                return
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                piece = running.pop(future)
+                try:
+                    outcomes = future.result()
+                except BrokenProcessPool:
+                    broken += [piece, *running.values()]
+                    running.clear()
+                    pool.shutdown(wait=False)
+                    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_begin)
+                    break
+                yield outcomes
+    except BaseException:
+        # stopped: what they are at is begun again next time, what they have done stays
+        for process in set(multiprocessing.active_children()) - before:
+            process.terminate()
+        raise
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _begin() -> None:
+    """Of a worker process: Ctrl-C is the driver's, and so is the end."""
+    import signal
+
+    import cv2
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    cv2.setNumThreads(1)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: multiprocessing.process.BaseProcess) -> None:
+    parent.join()
+    os._exit(1)
+
+
+def cluster_engine(address: str, folder: Path, say: Callable[[str], None]) -> Engine:
+    """The workers of a Dask scheduler.
+
+    Args:
+        folder: of the batch, which all workers must see under this very path.
+        say: told where the dashboard is.
+
+    Raises:
+        WallkitError: dask is not installed, no scheduler answers, or a worker has another wallkit or sees no folder.
+    """
+    try:
+        import distributed
+    except ImportError as error:
+        hint = "pip install 'wallkit[cluster]'"
+        raise WallkitError("a cluster needs dask and distributed", where="--scheduler", hint=hint) from error
+
+    def run(pieces: Iterator[Piece]) -> Iterator[list[Outcome]]:
+        try:
+            client: Any = distributed.Client(  # type: ignore[no-untyped-call]
+                address, timeout="10s", set_as_default=False
+            )
+        except (OSError, ValueError, ImportError) as error:
+            hint = "start one with `dask scheduler`, and workers with `dask worker ADDRESS --nthreads 1`"
+            raise WallkitError(f"no scheduler answers: {error}", where=address, hint=hint) from error
+        try:
+            _check_workers(client, address, folder)
+            say(f"dashboard {client.dashboard_link}")
+            yield from _through_client(client, pieces, address)
+        finally:
+            client.close(timeout=2)
+
+    return run
+
+
+def _through_client(client: Any, pieces: Iterator[Piece], address: str) -> Iterator[list[Outcome]]:
+    from concurrent.futures import CancelledError
+
+    import distributed
+    from distributed.comm.core import CommClosedError
+
+    running: dict[str, Piece] = {}
+    again: list[Piece] = []
+    done: Any = distributed.as_completed([], loop=client.loop)  # type: ignore[no-untyped-call]
+    while True:
+        ahead = _AHEAD * max(1, sum(client.nthreads().values())) if client.status == "running" else 0
+        chosen = [*itertools.islice(pieces, max(0, ahead - len(running))), *again]
+        again.clear()
+        for piece in chosen:
+            future = client.submit(do_piece, piece, wallkit.__version__, pure=False)
+            running[future.key] = piece
+            done.add(future)
+        if not running:
+            return
+        future = next(done)
+        piece = running.pop(future.key)
+        try:
+            yield future.result()
+        except distributed.KilledWorker:
+            outcomes, rest = without_killer(piece)
+            again += [rest] if rest else []
+            yield outcomes
+        except (CancelledError, CommClosedError, OSError) as error:
+            hint = "what is done is kept: start the scheduler, and the same command goes on from here"
+            raise WallkitError("the scheduler went away", where=address, hint=hint) from error
+
+
+def _check_workers(client: Any, address: str, folder: Path) -> None:
+    """Refuse workers that cannot do what is asked.
+
+    Raises:
+        WallkitError: there is none in ten seconds, or one has another wallkit or does not see the folder.
+    """
+    try:
+        client.wait_for_workers(1, timeout=10)
+    except TimeoutError as error:
+        hint = f"start one: dask worker {address} --nthreads 1"
+        raise WallkitError("the scheduler has no workers", where=address, hint=hint) from error
+    for name, (version, sees) in sorted(client.run(_about_worker, str(folder), on_error="return").items()):
+        if isinstance(version, BaseException) or version != wallkit.__version__:
+            hint = "install the same wallkit everywhere, and start the workers again"
+            raise WallkitError(
+                f"has wallkit {version}, this is {wallkit.__version__}", where=f"worker {name}", hint=hint
+            )
+        if not sees:
+            hint = "--out must be on a folder that all machines share, under one path"
+            raise WallkitError(f"does not see {folder}", where=f"worker {name}", hint=hint)
+
+
+def _about_worker(folder: str) -> tuple[str, bool]:
+    return wallkit.__version__, Path(folder).is_dir()
