@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import logging
 import multiprocessing
 import os
 import threading
@@ -125,6 +126,8 @@ def cluster_engine(address: str, folder: Path, say: Callable[[str], None]) -> En
         raise WallkitError("a cluster needs dask and distributed", where="--scheduler", hint=hint) from error
 
     def run(pieces: Iterator[Piece]) -> Iterator[list[Outcome]]:
+        # it tells of lost connections with tracebacks; we say it in a sentence
+        logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)
         try:
             client: Any = distributed.Client(  # type: ignore[no-untyped-call]
                 address, timeout="10s", set_as_default=False
