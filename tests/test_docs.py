@@ -222,9 +222,18 @@ def test_the_readmes_test_command_installs_what_the_tests_need():
     *_, install, test = readme_command("pytest -q")
     assert (install, test) == ("pip install '.[test]'", "pytest -q")
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert {"pytest", "pytest-xdist", "ezdxf", "mujoco", "hypothesis", "onnx", "ruff", "mypy", "dask", "distributed"} == {
-        re.split(r"[<>=]", name)[0] for name in project["optional-dependencies"]["test"]
-    }
+    assert {
+        "pytest",
+        "pytest-xdist",
+        "ezdxf",
+        "mujoco",
+        "hypothesis",
+        "onnx",
+        "ruff",
+        "mypy",
+        "dask",
+        "distributed",
+    } == {re.split(r"[<>=]", name)[0] for name in project["optional-dependencies"]["test"]}
 
 
 # -------------------------------------------------------------------------------------------------------- guides run

@@ -127,7 +127,8 @@ def cluster_engine(address: str, folder: Path, say: Callable[[str], None]) -> En
 
     def run(pieces: Iterator[Piece]) -> Iterator[list[Outcome]]:
         # it tells of lost connections with tracebacks; we say it in a sentence
-        logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)
+        for name in ("distributed", "distributed.client", "distributed.core", "distributed.comm"):
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
         try:
             client: Any = distributed.Client(  # type: ignore[no-untyped-call]
                 address, timeout="10s", set_as_default=False
