@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 _f4 = np.float32
-_ZERO, _ONE, _TWO, _BYTE = _f4(0.0), _f4(1.0), _f4(2.0), _f4(1.0 / 255.0)
+_ZERO, _ONE, _TWO, _FOUR, _BYTE = _f4(0.0), _f4(1.0), _f4(2.0), _f4(4.0), _f4(1.0 / 255.0)
 # of a log brightness: there is none so low
 UNKNOWN = _f4(-100.0)
 
@@ -80,43 +80,67 @@ def exposed_costs(
         image: (H, W) uint32 of red, green, blue and 1 where it is known, a byte each from the lowest: a whole floor of them
             stays in the cache, which four floats a pixel do not.
     """
-    height, width = image.shape
-    flat = image.reshape(-1)
-    x_last, y_last, row = _f4(width - 1), _f4(height - 1), np.int32(width)
     px, py, z0, z1, z2 = points[0], points[1], colours[0], colours[1], colours[2]
     count = px.shape[0]
     bright = _f4(0.299) * z0 + _f4(0.587) * z1 + _f4(0.114) * z2
-    packed, m = np.empty(count, np.uint32), np.empty((5, count), np.float32)
+    packed = np.empty(count, np.uint32)
+    # rows of one array would keep LLVM from seeing that they do not overlap, and the loops from being vectorised
+    m0, m1, m2, grey = np.empty_like(z0), np.empty_like(z0), np.empty_like(z0), np.empty_like(z0)
+    known = np.empty_like(z0)
     rounds = 2 if limit > _ONE else 0
     for i in range(placed.shape[1]):
-        c, s, x0, y0 = placed[0, i], placed[1, i], placed[2, i], placed[3, i]
-        for k in range(count):
-            x = min(max(x0 + c * px[k] - s * py[k], _ZERO), x_last)
-            y = min(max(y0 + s * px[k] + c * py[k], _ZERO), y_last)
-            packed[k] = flat[np.uint32(np.int32(y) * row + np.int32(x))]
+        _look_up(placed[0, i], placed[1, i], placed[2, i], placed[3, i], px, py, image, packed)
         above, below = _f4(1e-6), _f4(1e-6)
         for k in range(count):
             v = packed[k]
-            m[0, k] = _f4(np.int32(v & np.uint32(255))) * _BYTE
-            m[1, k] = _f4(np.int32((v >> np.uint32(8)) & np.uint32(255))) * _BYTE
-            m[2, k] = _f4(np.int32((v >> np.uint32(16)) & np.uint32(255))) * _BYTE
-            m[3, k] = _f4(np.int32(v >> np.uint32(24)))
-            m[4, k] = m[3, k] * (_f4(0.299) * m[0, k] + _f4(0.587) * m[1, k] + _f4(0.114) * m[2, k])
-            above += m[3, k] * bright[k]
-            below += m[4, k]
+            m0[k] = _f4(np.int32(v & np.uint32(255))) * _BYTE
+            m1[k] = _f4(np.int32((v >> np.uint32(8)) & np.uint32(255))) * _BYTE
+            m2[k] = _f4(np.int32((v >> np.uint32(16)) & np.uint32(255))) * _BYTE
+            known[k] = _f4(np.int32(v >> np.uint32(24)))
+            grey[k] = known[k] * (_f4(0.299) * m0[k] + _f4(0.587) * m1[k] + _f4(0.114) * m2[k])
+            above += known[k] * bright[k]
+            below += grey[k]
         g = min(max(above / below, _ONE / limit), limit)
         for _ in range(rounds):
             above, below = _f4(1e-6), _f4(1e-6)
             for k in range(count):
-                fits = m[3, k] if abs(bright[k] - g * m[4, k]) < most else _ZERO
+                fits = known[k] if abs(bright[k] - g * grey[k]) < most else _ZERO
                 above += fits * bright[k]
-                below += fits * m[4, k]
+                below += fits * grey[k]
             g = min(max(above / below, _ONE / limit), limit)
-        total, per = _ZERO, _ONE / g
-        for k in range(count):
-            d = _norm(abs(z0[k] * per - m[0, k]), abs(z1[k] * per - m[1, k]), abs(z2[k] * per - m[2, k]), order)
-            total += m[3, k] * min(d, most) + (_ONE - m[3, k]) * unseen
+        # a loop for each of the usual orders: a choice inside would keep it from being vectorised
+        if order == _TWO:
+            total = _differing(z0, z1, z2, _ONE / g, m0, m1, m2, known, _TWO, most, unseen)
+        elif order == _ONE:
+            total = _differing(z0, z1, z2, _ONE / g, m0, m1, m2, known, _ONE, most, unseen)
+        elif order == _FOUR:
+            total = _differing(z0, z1, z2, _ONE / g, m0, m1, m2, known, _FOUR, most, unseen)
+        else:
+            total = _differing(z0, z1, z2, _ONE / g, m0, m1, m2, known, order, most, unseen)
         out[i] = total / _f4(count)
+
+
+@njit(fastmath=True, inline="always")
+def _look_up(c: Any, s: Any, x0: Any, y0: Any, px: Any, py: Any, image: Any, found: Any) -> None:
+    """found[k] = the pixel of point k seen from a pose."""
+    flat, row = image.reshape(-1), np.int32(image.shape[1])
+    x_last, y_last = _f4(image.shape[1] - 1), _f4(image.shape[0] - 1)
+    for k in range(px.shape[0]):
+        x = min(max(x0 + c * px[k] - s * py[k], _ZERO), x_last)
+        y = min(max(y0 + s * px[k] + c * py[k], _ZERO), y_last)
+        found[k] = flat[np.uint32(np.int32(y) * row + np.int32(x))]
+
+
+@njit(fastmath=True, inline="always")
+def _differing(
+    z0: Any, z1: Any, z2: Any, per: Any, m0: Any, m1: Any, m2: Any, known: Any, order: Any, most: Any, unseen: Any
+) -> Any:
+    """sum_k min(|| z[k] * per - m[k] ||, most), `unseen` where m is not known."""
+    total = _ZERO
+    for k in range(z0.shape[0]):
+        d = _norm(abs(z0[k] * per - m0[k]), abs(z1[k] * per - m1[k]), abs(z2[k] * per - m2[k]), order)
+        total += known[k] * (min(d, most) - unseen)
+    return total + _f4(z0.shape[0]) * unseen
 
 
 @njit(cache=True, fastmath=True, nogil=True)
@@ -132,36 +156,28 @@ def gradient_costs(
         image: (H, W) float32, far below any value where it is not known, with a border of such.
         placed, most, unseen, out: as `colour_costs`.
     """
-    height, width = image.shape
-    flat = image.reshape(-1)
-    x_last, y_last, row = _f4(width - 1), _f4(height - 1), np.int32(width)
-    px, py = points[0], points[1]
-    rows, columns = values.shape
-    above, is_above = np.zeros(columns, np.float32), np.zeros(columns, np.float32)
+    columns, count = values.shape[1], values.size
+    px, py, z, is_seen = points[0].reshape(-1), points[1].reshape(-1), values.reshape(-1), seen.reshape(-1)
+    # how much a pair counts of a place and the one before it in its row (beside), or in its column (above)
+    beside, above, pairs = np.zeros_like(z), np.zeros_like(z), _ZERO
+    for k in range(count):
+        beside[k] = is_seen[k] * is_seen[k - 1] if k % columns > 0 else _ZERO
+        above[k] = is_seen[k] * is_seen[k - columns] if k >= columns else _ZERO
+        pairs += beside[k] + above[k]
+    found, rest, known = np.empty_like(z), np.empty_like(z), np.empty_like(z)
     for i in range(placed.shape[1]):
-        c, s, x0, y0 = placed[0, i], placed[1, i], placed[2, i], placed[3, i]
-        total, count = _ZERO, _ZERO
-        for a in range(rows):
-            left, is_left = _ZERO, _ZERO
-            for b in range(columns):
-                x = min(max(x0 + c * px[a, b] - s * py[a, b], _ZERO), x_last)
-                y = min(max(y0 + s * px[a, b] + c * py[a, b], _ZERO), y_last)
-                value = flat[np.uint32(np.int32(y) * row + np.int32(x))]
-                known = _ONE if value > UNKNOWN else _ZERO
-                rest = values[a, b] - value
-                if b > 0:
-                    both = is_left * known
-                    weight = seen[a, b] * seen[a, b - 1]
-                    total += weight * (both * min(abs(rest - left), most) + (_ONE - both) * unseen)
-                    count += weight
-                if a > 0:
-                    both = is_above[b] * known
-                    weight = seen[a, b] * seen[a - 1, b]
-                    total += weight * (both * min(abs(rest - above[b]), most) + (_ONE - both) * unseen)
-                    count += weight
-                left, is_left = rest, known
-                above[b], is_above[b] = rest, known
-        out[i] = total / max(count, _ONE)
+        _look_up(placed[0, i], placed[1, i], placed[2, i], placed[3, i], px, py, image, found)
+        for k in range(count):
+            known[k] = _ONE if found[k] > UNKNOWN else _ZERO
+            rest[k] = z[k] - found[k]
+        total = pairs * unseen
+        for k in range(1, count):
+            cost = min(abs(rest[k] - rest[k - 1]), most) - unseen
+            total += beside[k] * known[k] * known[k - 1] * cost
+        for k in range(columns, count):
+            cost = min(abs(rest[k] - rest[k - columns]), most) - unseen
+            total += above[k] * known[k] * known[k - columns] * cost
+        out[i] = total / max(pairs, _ONE)
 
 
 @njit(cache=True, fastmath=True, nogil=True)
