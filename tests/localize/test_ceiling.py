@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.localize.ceilings import drive, eye, painted, photograph
+from tests.localize.worlds import FLAT, fields_of, scan_at
 from wallkit.core.ceiling import CeilingSight, colours_at
 from wallkit.core.ceiling_eye import smoothed
 from wallkit.core.config import Source, build, source_from_words
@@ -16,6 +17,8 @@ from wallkit.localize.ceiling_eye import ceiling_eyes, fields_of_ceiling
 from wallkit.localize.ceiling_filter import SEED, ceiling_localizer
 from wallkit.localize.ceiling_settings import CeilingSettings
 from wallkit.localize.colours import SPACES
+from wallkit.localize.filter import monte_carlo_localizer
+from wallkit.localize.sensor import LikelihoodField
 from wallkit.localize.settings import LocalizeSettings
 
 RNG = np.random.default_rng(0)
@@ -245,3 +248,30 @@ def test_of_two_places_that_the_lidar_takes_for_possible_one_is_ruled_out():
     twin = compose(POSE, [0.0, 0.0, np.pi])
     left = eyes.tell_apart((Place(twin, 1.0), Place(POSE, 1.0)), np.zeros(3), [(np.zeros(3), VIEW)])
     assert [tuple(place.pose) for place in left] == [tuple(POSE)]
+
+
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("confirmed", [False, True])
+def test_lidar_and_ceiling_add_each_by_its_own_temperature(name, confirmed):
+    """log w = e (temper * sum of the beams - cost / T): the same models with both at 1 say what the two are worth."""
+    caution, temper, T = 0.4, 0.17, 0.035
+    fields, scan = fields_of(FLAT), scan_at(FLAT, [3.5, 2.5, 0.3], beams=60)
+    settings = build(
+        LocalizeSettings,
+        [source_from_words([f"ceiling.model={name}", f"ceiling.model.temperature={T}", "ceiling.gain=none"])],
+    )[0]
+    settings = replace(settings, caution=caution, sensor=LikelihoodField(temper=temper), update_distance_m=0.0)
+    tracker, rng = monte_carlo_localizer(settings, fields, SMOOTH), np.random.default_rng(3)
+    belief = tracker.predict(rng, tracker.start(rng, "global"), np.zeros(3))
+    belief = replace(belief, odometry=np.zeros(3), trust=replace(belief.trust, is_confirmed=confirmed))
+    before = belief.particles.log_weights
+    belief = tracker.look(belief, CeilingSight(VIEW, np.zeros(3)))
+    poses, eyes = belief.particles.poses, tracker.eyes
+    cost = -replace(settings.ceiling.model, temperature=1.0).on(eyes.ceiling).log_likelihood(poses, VIEW)
+    beams = LikelihoodField(temper=1.0).on(fields).log_likelihood(poses, scan)
+    e = 1.0 if confirmed else caution
+    np.testing.assert_allclose(belief.particles.log_weights - before, -e * cost / T, rtol=1e-5, atol=1e-5)
+    both = tracker._weighed(belief, scan).log_weights - before
+    np.testing.assert_allclose(both, e * (temper * beams - cost / T), rtol=1e-4, atol=1e-3)
+    assert np.ptp(temper * beams) > 1
+    assert np.ptp(cost / T) > 0.2
