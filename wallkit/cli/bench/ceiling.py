@@ -60,7 +60,7 @@ def ceiling(
 ) -> None:
     """Run the ceiling's models on folders of `wallkit simulate log`; without folders time one update of each model.
 
-    With --picture the rows of a file need no folders.
+    With --rows alone it prints the file's rows.
 
     Times are CPU time. A run is near within 0.5 m and 10 degrees, has come once it was near for a second, and has
     converged if it is near for the last ten seconds or more.
@@ -76,7 +76,7 @@ def ceiling(
 
     from wallkit.pipelines.run_folder import machine
 
-    if not runs and picture is None:
+    if not runs and rows is None:
         _cost(as_json)
         return
     asked = [models.split(","), resamplers.split(","), inits.split(",")]
@@ -105,7 +105,8 @@ def ceiling(
     ]
     cells = [
         [
-            row.world, row.story + ("" if row.end_s is None else f" {row.end_s:g} s"), row.model, row.resampler, row.init, f"{row.came}/{row.seeds}", f"{row.first:.0f}",
+            row.world, row.story + ("" if row.end_s is None else f" {row.end_s:g} s"), row.model, row.resampler, row.init,
+            f"{row.came}/{row.seeds}", f"{row.first:.0f}",
             f"{row.converged}/{row.seeds}", f"{row.updates:.0f}", f"{row.error_m:.3f}", f"{row.error_deg:.2f}",
             f"{row.share_near:.0%}", f"{row.back}/{row.lost}", f"{row.back_updates:.0f}", f"{row.ms_per_update:.2f}",
         ]
