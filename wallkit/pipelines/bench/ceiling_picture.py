@@ -39,7 +39,7 @@ def bars_picture(rows: Sequence[Row]) -> bytes:
         for axes, (world, found) in zip(panels, shown.items(), strict=True):
             for y, name in enumerate(names):
                 if name not in found:
-                    axes.text(2, y, "cannot: no colours", va="center", fontsize=9, color=canvas.MUTED)
+                    axes.text(2, y, "not run", va="center", fontsize=9, color=canvas.MUTED)
                     continue
                 row = found[name]
                 share = 100 * row.converged / row.seeds
