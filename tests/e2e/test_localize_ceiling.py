@@ -32,6 +32,7 @@ def test_by_the_ceiling_alone_without_knowing_where_it_starts(wallkit, folder, t
     rows = [float(v) for v in (tmp_path / "alone" / "estimate.tum").read_text().splitlines()[-1].split()[1:3]]
     assert np.hypot(rows[0] - found["pose"]["x_m"], rows[1] - found["pose"]["y_m"]) < 1e-6
     assert found["ate_median_m"] < 0.05
+    assert "faded, is the ceiling" in (tmp_path / "alone" / "report.html").read_text()
 
 
 def test_a_corridor_that_looks_the_same_from_both_ends_is_resolved_by_its_ceiling(wallkit, folder, tmp_path):

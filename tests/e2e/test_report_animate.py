@@ -12,7 +12,7 @@ from PIL import Image
 import wallkit.sample
 from wallkit.core.types import Trajectory
 from wallkit.errors import WallkitError
-from wallkit.pipelines.animate import chosen
+from wallkit.pipelines.animate import chosen, doubling
 from wallkit.report.animate import Ground, film
 
 SAMPLE = Path(wallkit.sample.__file__).parent
@@ -34,6 +34,14 @@ def test_a_run_becomes_a_gif_or_a_film_over_its_map(wallkit, tmp_path):
         shown = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
     assert len(shown) > frames
     assert np.abs(shown[0].astype(int) - shown[-1]).mean() > 0.5
+    assert wallkit("report", "run", "--animate", "cloud.png").out.strip() == "animated cloud.png: 6 moments"
+    with Image.open(tmp_path / "cloud.png") as sheet:
+        width, height = sheet.size
+        assert width > 3 * 700
+        halves = np.asarray(sheet.convert("L"), dtype=int)
+    # the first cloud is wide, the last one is not
+    dark = [(part < 30).sum() for part in (halves[: height // 2, : width // 3], halves[height // 2 :, -width // 3 :])]
+    assert dark[0] > dark[1]
     refused = wallkit("report", "run", "--animate", "cloud.avi")
     assert (refused.code, ".mp4" in refused.err) == (2, True)
     assert wallkit("report", "run", "--animate", "cloud.gif", "-o", "page.html").code == 2
@@ -45,6 +53,12 @@ def test_the_first_moments_are_neighbours_and_the_last_is_shown():
     assert len(shown) == len(set(shown.tolist())) == 60
     assert shown[:16].tolist() == list(range(16))
     assert shown[-1] == 999
+
+
+def test_on_a_page_moments_are_ever_further_apart():
+    assert doubling(4, 6).tolist() == [0, 1, 2, 3]
+    shown = doubling(1000, 6)
+    assert shown.tolist() == [0, 3, 15, 62, 250, 999]
 
 
 def test_without_pyav_the_film_says_what_to_install(wallkit, tmp_path, monkeypatch):

@@ -133,7 +133,7 @@ def compare(
     "--animate",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Its particles as a .gif or .mp4 (extra [video]), and no page.",
+    help="Its particles as a .gif, a .mp4 (extra [video]) or six moments as a .png, and no page.",
 )
 @read_batch.batch_options
 @common.config_option
@@ -152,6 +152,7 @@ def report(runs: tuple[Path, ...], truth: Path | None, out: Path | None, animate
       wallkit report a/ b/ --out report.html
       wallkit report basic/ wall_mask/ --names "{scene}-{people}-{take}" --by people -o report.html
       wallkit report log.wallkit --animate cloud.mp4
+      wallkit report log.wallkit --animate cloud.png
     """
     from wallkit.pipelines.report import compare_runs, write_compare_report, write_run_report
 

@@ -1,7 +1,8 @@
-"""A run's particles -> a GIF or an MP4 over the ceiling it was localized by, or over its map."""
+"""A run's particles -> a GIF, an MP4 or a PNG over the ceiling it was localized by, or over its map."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -9,16 +10,16 @@ import numpy as np
 from wallkit.core.types import Health, Int64Array, PointCloud
 from wallkit.errors import WallkitError
 from wallkit.logs.reader import open_log
-from wallkit.maps.ceiling.files import read_ceiling
 from wallkit.pipelines.outputs import write_whole
-from wallkit.pipelines.run_folder import RESULT_MCAP, RunRecord
-from wallkit.report.animate import Ground, animation, film, ground_of_ceiling, ground_of_grid
+from wallkit.pipelines.run_folder import RESULT_MCAP, RunRecord, ceiling_of
+from wallkit.report.animate import Ground, animation, film, ground_of_ceiling, ground_of_grid, sheet
 from wallkit.report.data import Snapshot
 
+Choice = Callable[[int, int], Int64Array]
 _CLOUDS = "/wallkit/particles/cloud"
-_FORMS = {".gif": animation, ".mp4": film}
-# moments shown at most, of which the first ones, when impossible particles die, are neighbours
-_MOMENTS = {".gif": 60, ".mp4": 240}
+_FORMS = {".gif": animation, ".mp4": film, ".png": sheet}
+# moments shown at most
+_MOMENTS = {".gif": 60, ".mp4": 240, ".png": 6}
 
 
 def write_animation(out: Path, record: RunRecord, folder: Path) -> int:
@@ -32,21 +33,23 @@ def write_animation(out: Path, record: RunRecord, folder: Path) -> int:
     """
     form = out.suffix.lower()
     if form not in _FORMS:
-        raise WallkitError(f"'{out.suffix}' is no animation", where=out, hint="name a file that ends in .gif or .mp4")
-    moments = recorded(folder, record, _MOMENTS[form]) or record.snapshots
+        raise WallkitError(
+            f"'{out.suffix}' is no animation", where=out, hint="name a file that ends in .gif, .mp4 or .png"
+        )
+    moments = recorded(folder, record, _CHOICES[form], _MOMENTS[form]) or record.snapshots[-_MOMENTS[form] :]
     if not moments:
         raise WallkitError("the run kept no particles", where=record.name, hint="run wallkit localize with one seed")
     write_whole(out, _FORMS[form](_ground(record), moments, record.steps.trajectory, record.truth))
     return len(moments)
 
 
-def recorded(folder: Path, record: RunRecord, most: int) -> tuple[Snapshot, ...]:
-    """Particles of a run's result.mcap at the first updates and evenly over the rest; none if it holds none."""
+def recorded(folder: Path, record: RunRecord, choose: Choice, most: int) -> tuple[Snapshot, ...]:
+    """Particles of a run's result.mcap at chosen updates; none if it holds none."""
     if not (folder / RESULT_MCAP).is_file():
         return ()
     log = open_log([folder / RESULT_MCAP])
     count = sum(channel.topic == _CLOUDS for _, _, channel, _ in log.raw([_CLOUDS]))
-    wanted = set(chosen(count, most).tolist())
+    wanted = set(choose(count, most).tolist())
     shots = []
     for i, message in enumerate(log.messages([_CLOUDS])):
         if i in wanted and isinstance(cloud := message.value, PointCloud):
@@ -66,10 +69,19 @@ def chosen(count: int, most: int) -> Int64Array:
     return np.concatenate([np.arange(first), np.linspace(first, count - 1, most - first).round().astype(np.int64)])
 
 
+def doubling(count: int, most: int) -> Int64Array:
+    """Which of so many moments stand on a page: the first, the last, and between them each so many times later."""
+    if count <= most:
+        return np.arange(count)
+    return np.unique(np.geomspace(1, count, most).round().astype(np.int64)) - 1
+
+
+_CHOICES: dict[str, Choice] = {".gif": chosen, ".mp4": chosen, ".png": doubling}
+
+
 def _ground(record: RunRecord) -> Ground:
-    named = record.run.get("ceiling")
-    if named and Path(named).is_file():
-        return ground_of_ceiling(read_ceiling(Path(named)))
+    if (ceiling := ceiling_of(record.run)) is not None:
+        return ground_of_ceiling(ceiling)
     if record.grid is not None:
         return ground_of_grid(record.grid)
     raise WallkitError(

@@ -12,7 +12,7 @@ from wallkit.core.types import Health
 from wallkit.errors import WallkitError
 from wallkit.evaluate.statistics import compare_errors, compare_seeds, summarise
 from wallkit.pipelines.evaluate import EvaluateSettings, Evaluation
-from wallkit.pipelines.run_folder import RunRecord
+from wallkit.pipelines.run_folder import RunRecord, ceiling_of
 from wallkit.report.compare import CompareData, Contender
 from wallkit.report.data import ReportData, Tone
 from wallkit.report.html import write_comparison, write_report
@@ -42,6 +42,7 @@ def report_data(record: RunRecord, evaluation: Evaluation, settings: EvaluateSet
         run=record.run,
         metrics={**evaluation.metrics, **record.resources},
         grid=record.grid,
+        ceiling=ceiling_of(record.run),
         truth=record.truth,
         errors=evaluation.errors,
         odometry=record.odometry,

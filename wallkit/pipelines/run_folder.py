@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 import wallkit
+from wallkit.core.ceiling import CeilingMap
 from wallkit.core.config import table_from
 from wallkit.core.results import Value
 from wallkit.core.steps import Steps, read_steps, write_steps
@@ -25,6 +26,7 @@ from wallkit.evaluate.resources import mark_now, usage_since
 from wallkit.evaluate.tum import read_tum, write_tum
 from wallkit.logs.layout import write_layout
 from wallkit.logs.reader import open_log
+from wallkit.maps.ceiling.files import read_ceiling
 from wallkit.pipelines.config import Config, LoadedConfig
 from wallkit.pipelines.evaluate import Evaluation
 from wallkit.pipelines.localize import Run
@@ -125,6 +127,16 @@ def read_run(folder: Path) -> RunRecord:
         _read_snapshots(folder / "snapshots.npz"),
         read_overlays(folder),
     )
+
+
+def ceiling_of(run: Mapping[str, Any]) -> CeilingMap | None:
+    """The ceiling that run.json names, read again; None if it names none or the file is gone.
+
+    Raises:
+        MapError: it is there and cannot be read.
+    """
+    named = run.get("ceiling")
+    return read_ceiling(Path(named)) if named and Path(named).is_file() else None
 
 
 def dropped(run: Run) -> dict[str, int]:

@@ -1,4 +1,4 @@
-"""Particles at moments of a run -> a GIF or a film: how the cloud gathers, over the map or over the ceiling."""
+"""Particles at moments of a run -> a GIF, a film or a sheet: how the cloud gathers, over the map or over the ceiling."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from wallkit.errors import WallkitError
 from wallkit.report.data import Snapshot
 
 _WIDTH_PX = 720
+# panels beside each other on a sheet, and the white between them
+_COLUMNS, _GAP_PX = 3, 8
 # a picture of a GIF stays so long, less where there are many
 _MS, _SHORT_MS, _LAST_MS, _MANY = 900, 200, 3000, 20
 _PICTURES_PER_S = 8
@@ -80,6 +82,21 @@ def film(ground: Ground, snapshots: Sequence[Snapshot], estimate: Trajectory, tr
             picture = _picture(ground, shot, estimate, truth).crop((0, 0, stream.width, stream.height))
             container.mux(stream.encode(av.VideoFrame.from_ndarray(np.asarray(picture), format="rgb24")))
         container.mux(stream.encode())
+    return file.getvalue()
+
+
+def sheet(ground: Ground, snapshots: Sequence[Snapshot], estimate: Trajectory, truth: Trajectory | None) -> bytes:
+    """The same moments as one PNG, three in a row, to be read like a page."""
+    from PIL import Image
+
+    pictures = [_picture(ground, shot, estimate, truth) for shot in snapshots]
+    columns = min(len(pictures), _COLUMNS)
+    width, height = (side + _GAP_PX for side in pictures[0].size)
+    whole = Image.new("RGB", (columns * width - _GAP_PX, -(-len(pictures) // columns) * height - _GAP_PX), "white")
+    for number, picture in enumerate(pictures):
+        whole.paste(picture, (number % columns * width, number // columns * height))
+    file = BytesIO()
+    whole.save(file, format="PNG", optimize=True)
     return file.getvalue()
 
 

@@ -143,7 +143,8 @@ def _png(raster: Raster) -> bytes:
     image = Image.fromarray(raster.indices)
     image.putpalette([channel for colour in raster.palette for channel in colour])
     buffer = io.BytesIO()
-    image.save(buffer, format="png", bits=2 if len(raster.palette) <= 4 else 4)
+    bits = next(bits for bits in (2, 4, 8) if len(raster.palette) <= 2**bits)
+    image.save(buffer, format="png", bits=bits)
     return buffer.getvalue()
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from wallkit.core.ceiling import CeilingMap
 from wallkit.core.results import Episode, Errors, Limits, Value
 from wallkit.core.steps import Steps
 from wallkit.core.types import Float64Array, OccupancyGrid, Trajectory
@@ -49,6 +50,7 @@ class ReportData:
         run: run.json as it was written: version, argv, seed, hashes of the inputs, machine, times.
         metrics: by key; those in `headline` that exist stand at the top of the page.
         grid: the map; None leaves the walls out.
+        ceiling: what it was localized by, alone or too; it lies faded behind the plan.
         truth, errors: None without a known truth.
         odometry: in its own frame; it is drawn from the first estimate on.
         episodes: stretches of wrong estimates, from `evaluate`.
@@ -64,6 +66,7 @@ class ReportData:
     run: Mapping[str, Any] = field(default_factory=dict)
     metrics: Mapping[str, Value] = field(default_factory=dict)
     grid: OccupancyGrid | None = None
+    ceiling: CeilingMap | None = None
     truth: Trajectory | None = None
     errors: Errors | None = None
     odometry: Trajectory | None = None

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wallkit.core.geometry import compose, interpolate_poses, relative
-from wallkit.core.types import BoolArray, Float64Array, Health, Int64Array, OccupancyGrid, Trajectory, UInt8Array
+from wallkit.core.types import BoolArray, Float64Array, Health, Int64Array, Trajectory, UInt8Array
 from wallkit.report import canvas
 from wallkit.report.canvas import Key, Raster
 from wallkit.report.data import Picture, ReportData, Snapshot
+from wallkit.report.overhead import draw_ceiling
 from wallkit.report.walls import WALL_COLOURS, View, draw_walls, view_of
 
 if TYPE_CHECKING:
@@ -67,13 +68,14 @@ def map_figure(data: ReportData) -> Picture | None:
     y_ticks = canvas.linear_ticks(view.bottom, view.top, count=max(2, round(view.size[1] / per_tick_m)))
     canvas.draw_ticks(axes, "x", x_ticks, "x in the map [m]")
     canvas.draw_ticks(axes, "y", y_ticks, "y in the map [m]")
-    reading = f"The wider and warmer the line, the larger the {what}. {_worst(data)}"
+    overhead = "" if data.ceiling is None else " Behind it, faded, is the ceiling."
+    reading = f"The wider and warmer the line, the larger the {what}.{overhead} {_worst(data)}"
     return Picture(
         "map",
         "Where the robot was",
         reading if data.errors else f"{reading}No truth is known: the spread is what the filter claims, not its error.",
-        f"Map with the estimated path from start to end, its {what} shown by colour and width. {_worst(data)}",
-        canvas.svg_from_figure(figure, _walls(axes, data.grid, view, (width_in, height_in))),
+        f"Map with the estimated path from start to end, its {what} shown by colour and width.{overhead} {_worst(data)}",
+        canvas.svg_from_figure(figure, _ground(axes, data, view, (width_in, height_in))),
     )
 
 
@@ -120,12 +122,15 @@ def _view_of_run(data: ReportData) -> View:
     return view_of(places, margin_m=margin_m, aspect=float(np.clip(width / height, 1.3, 3.5)))
 
 
-def _walls(axes: Axes, grid: OccupancyGrid | None, view: View, inches: tuple[float, float]) -> list[Raster]:
-    if grid is None:
-        return []
+def _ground(axes: Axes, data: ReportData, view: View, inches: tuple[float, float]) -> list[Raster]:
+    """The walls, and the ceiling above them if the run saw it."""
     pixels = (round(inches[0] * _MAP_PIXELS_PER_INCH), round(inches[1] * _MAP_PIXELS_PER_INCH))
     box = (view.left, view.bottom, view.right, view.top)
-    return [Raster(axes, draw_walls(grid, view, pixels=pixels), WALL_COLOURS, box)]
+    if data.ceiling is not None:
+        return [Raster(axes, *draw_ceiling(data.ceiling, data.grid, view, pixels=pixels), box)]
+    if data.grid is None:
+        return []
+    return [Raster(axes, draw_walls(data.grid, view, pixels=pixels), WALL_COLOURS, box)]
 
 
 def _coloured_path(axes: Axes, data: ReportData, what: str, step_m: float) -> list[Key]:
