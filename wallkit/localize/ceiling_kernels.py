@@ -83,13 +83,13 @@ def exposed_costs(
     px, py, z0, z1, z2 = points[0], points[1], colours[0], colours[1], colours[2]
     count = px.shape[0]
     bright = _f4(0.299) * z0 + _f4(0.587) * z1 + _f4(0.114) * z2
-    packed = np.empty(count, np.uint32)
+    flat, packed = image.reshape(-1), np.empty(count, np.uint32)
     # rows of one array would keep LLVM from seeing that they do not overlap, and the loops from being vectorised
     m0, m1, m2, grey = np.empty_like(z0), np.empty_like(z0), np.empty_like(z0), np.empty_like(z0)
     known = np.empty_like(z0)
     rounds = 2 if limit > _ONE else 0
     for i in range(placed.shape[1]):
-        _look_up(placed[0, i], placed[1, i], placed[2, i], placed[3, i], px, py, image, packed)
+        _look_up(placed[0, i], placed[1, i], placed[2, i], placed[3, i], px, py, flat, image.shape, packed)
         above, below = _f4(1e-6), _f4(1e-6)
         for k in range(count):
             v = packed[k]
@@ -121,10 +121,9 @@ def exposed_costs(
 
 
 @njit(fastmath=True, inline="always")
-def _look_up(c: Any, s: Any, x0: Any, y0: Any, px: Any, py: Any, image: Any, found: Any) -> None:
-    """found[k] = the pixel of point k seen from a pose."""
-    flat, row = image.reshape(-1), np.int32(image.shape[1])
-    x_last, y_last = _f4(image.shape[1] - 1), _f4(image.shape[0] - 1)
+def _look_up(c: Any, s: Any, x0: Any, y0: Any, px: Any, py: Any, flat: Any, shape: Any, found: Any) -> None:
+    """found[k] = the pixel of point k seen from a pose, of an image of some shape, its rows one after the other."""
+    x_last, y_last, row = _f4(shape[1] - 1), _f4(shape[0] - 1), np.int32(shape[1])
     for k in range(px.shape[0]):
         x = min(max(x0 + c * px[k] - s * py[k], _ZERO), x_last)
         y = min(max(y0 + s * px[k] + c * py[k], _ZERO), y_last)
@@ -156,7 +155,7 @@ def gradient_costs(
         image: (H, W) float32, far below any value where it is not known, with a border of such.
         placed, most, unseen, out: as `colour_costs`.
     """
-    columns, count = values.shape[1], values.size
+    columns, count, flat = values.shape[1], values.size, image.reshape(-1)
     px, py, z, is_seen = points[0].reshape(-1), points[1].reshape(-1), values.reshape(-1), seen.reshape(-1)
     # how much a pair counts of a place and the one before it in its row (beside), or in its column (above)
     beside, above, pairs = np.zeros_like(z), np.zeros_like(z), _ZERO
@@ -166,7 +165,7 @@ def gradient_costs(
         pairs += beside[k] + above[k]
     found, rest, known = np.empty_like(z), np.empty_like(z), np.empty_like(z)
     for i in range(placed.shape[1]):
-        _look_up(placed[0, i], placed[1, i], placed[2, i], placed[3, i], px, py, image, found)
+        _look_up(placed[0, i], placed[1, i], placed[2, i], placed[3, i], px, py, flat, image.shape, found)
         for k in range(count):
             known[k] = _ONE if found[k] > UNKNOWN else _ZERO
             rest[k] = z[k] - found[k]
