@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import os
 import random
 import shutil
@@ -11,6 +12,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -22,10 +25,10 @@ MANIFEST = """
 logs = ["logs"]
 maps = ["beside:floor.wkmap.urdf"]
 init = "truth"
-end_s = 3
+end_s = 2
 seeds = [0, 1]
 [settings.localize]
-particles = 200
+particles = 50
 [[configurations]]
 name = "basic"
 [[configurations]]
@@ -37,12 +40,16 @@ MAIN = "from wallkit.cli.app import main; main()"
 
 @pytest.fixture
 def fleet(tmp_path):
-    for name in ("one", "two"):
-        (tmp_path / "logs" / name).mkdir(parents=True)
-        (tmp_path / "logs" / name / "log.mcap").symlink_to(SAMPLE / "log.mcap")
-        (tmp_path / "logs" / name / "floor.wkmap.urdf").symlink_to(SAMPLE / "floor.wkmap.urdf")
-    (tmp_path / "fleet.toml").write_text(MANIFEST)
-    return tmp_path
+    return made(tmp_path, "one", "two")
+
+
+def made(folder: Path, *logs: str) -> Path:
+    for name in logs:
+        (folder / "logs" / name).mkdir(parents=True)
+        (folder / "logs" / name / "log.mcap").symlink_to(SAMPLE / "log.mcap")
+        (folder / "logs" / name / "floor.wkmap.urdf").symlink_to(SAMPLE / "floor.wkmap.urdf")
+    (folder / "fleet.toml").write_text(MANIFEST)
+    return folder
 
 
 def table(out: Path) -> str:
@@ -70,28 +77,60 @@ def wait_for(found, seconds: float = 120.0) -> None:
         time.sleep(0.05)
 
 
-def test_bad_logs_among_good_ones_and_what_is_done_is_not_done_again(wallkit, fleet):
+def test_bad_logs_among_good_ones_and_what_is_done_is_not_done_again_even_on_a_cluster(wallkit, tmp_path):
+    fleet = made(tmp_path, "one")
     for name in ("bad", "mapless"):
         (fleet / "logs" / name).mkdir()
     (fleet / "logs" / "bad" / "log.mcap").write_bytes(b"no recording at all")
     (fleet / "logs" / "mapless" / "log.mcap").symlink_to(SAMPLE / "log.mcap")
     done = wallkit("batch", "fleet.toml", "--out", "o", cwd=fleet)
     assert done.code == 3, done.err
-    assert "done     8 of 16 runs" in done.out
+    assert "done     4 of 12 runs" in done.out
     assert "logs/bad/log.mcap" in done.out
     assert "logs/mapless/floor.wkmap.urdf" in done.out
     assert "Traceback" not in done.out + done.err
     first, row = table(fleet / "o"), fleet / "o" / "runs" / "one" / "line" / "seed-1"
     stamp = (row / "outcome.json").stat().st_mtime_ns
-    shutil.copy(SAMPLE / "floor.wkmap.urdf", fleet / "logs" / "mapless")
-    again = wallkit("batch", "fleet.toml", "--out", "o", "--retry", "--json", cwd=fleet)
-    assert (again.json["runs"], again.json["before"], again.json["failed"]) == (16, 8, 4)
-    assert (row / "outcome.json").stat().st_mtime_ns == stamp
-    assert {line for line in first.splitlines() if "done" in line} <= set(table(fleet / "o").splitlines())
     said = wallkit("compare", "o", cwd=fleet)
     assert said.code == 0, said.err
     assert "basic" in said.out
     assert "failed" in said.out
+    with quick_cluster(fleet) as address:
+        elsewhere = wallkit("batch", "fleet.toml", "--out", "c", "--scheduler", address, cwd=fleet)
+        assert elsewhere.code == 3, elsewhere.err
+        assert "dashboard http" in elsewhere.err
+        assert table(fleet / "c") == first
+        shutil.copy(SAMPLE / "floor.wkmap.urdf", fleet / "logs" / "mapless")
+        words = ("batch", "fleet.toml", "--out", "o", "--scheduler", address, "--retry", "--json")
+        again = wallkit(*words, cwd=fleet)
+        assert (again.json["runs"], again.json["before"], again.json["failed"]) == (12, 4, 4)
+        assert (row / "outcome.json").stat().st_mtime_ns == stamp
+        assert {line for line in first.splitlines() if "done" in line} <= set(table(fleet / "o").splitlines())
+        one_worker_pretends_to_have(address, "0.0.1")
+        refused = wallkit(*words, cwd=fleet)
+        assert refused.code == 2
+        assert "has wallkit 0.0.1, this is" in refused.err
+        assert "hint: install the same wallkit everywhere" in refused.err
+
+
+@contextmanager
+def quick_cluster(folder: Path) -> Iterator[str]:
+    """Address of the scheduler."""
+    pytest.importorskip("distributed")
+    command = [sys.executable, "-m", "tests.e2e.cluster", str(folder)]
+    root = Path(__file__).parents[2]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=root) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        yield process.stdout.readline().strip()
+        process.stdin.close()
+
+
+def one_worker_pretends_to_have(address: str, version: str) -> None:
+    import distributed
+
+    with distributed.Client(address, set_as_default=False) as client:
+        client.run(setattr, package, "__version__", version, workers=list(client.nthreads())[:1])
 
 
 def test_other_things_are_not_touched(wallkit, fleet):
@@ -107,6 +146,7 @@ def test_other_things_are_not_touched(wallkit, fleet):
     assert "Traceback" not in lost.err
 
 
+@pytest.mark.slow
 def test_ctrl_c_stops_cleanly_and_the_next_start_goes_on(fleet):
     whole = start(fleet, "--out", "whole", "-q")
     assert end(whole)[0] == 0
@@ -121,6 +161,24 @@ def test_ctrl_c_stops_cleanly_and_the_next_start_goes_on(fleet):
     assert end(after)[0] == 0
     assert table(fleet / "o") == table(fleet / "whole")
     assert not list((fleet / "o").glob("**/.*.partial-*"))
+
+
+@pytest.mark.slow
+def test_a_process_that_is_killed_takes_nothing_with_it(fleet):
+    whole = start(fleet, "--out", "whole", "-q")
+    assert end(whole)[0] == 0
+    run = start(fleet, "--out", "o", "-q", "--jobs", 2)
+    wait_for(lambda: list((fleet / "o" / "runs").glob("*/*/*/outcome.json")))
+    os.kill(pid_of_first(fleet / "o"), signal.SIGKILL)
+    assert end(run) == (0, "")
+    assert table(fleet / "o") == table(fleet / "whole")
+    assert len({row["timing.worker"] for row in csv.DictReader((fleet / "o" / "batch.csv").open())}) == 3
+
+
+def pid_of_first(out: Path) -> int:
+    """The process that did the first run found."""
+    outcome = json.loads(next((out / "runs").glob("*/*/*/outcome.json")).read_text())
+    return int(outcome["worker"].split(":")[1])
 
 
 @pytest.mark.slow
@@ -159,8 +217,6 @@ class Cluster:
 
     @property
     def address(self) -> str:
-        import json
-
         return str(json.loads(self.file.read_text())["address"])
 
     def _begin(self, command: list[str]) -> subprocess.Popen[bytes]:
@@ -187,14 +243,7 @@ def test_a_cluster_makes_the_same_table_and_survives_a_worker(fleet, cluster):
     assert end(whole)[0] == 0
     run = start(fleet, "--out", "o", "-q", "--scheduler", cluster.address)
     wait_for(lambda: list((fleet / "o" / "runs").glob("*/*/*/outcome.json")))
-    pid = int(
-        next((fleet / "o" / "runs").glob("*/*/*/outcome.json"))
-        .read_text()
-        .split('"worker": "')[1]
-        .split(":")[1]
-        .split('"')[0]
-    )
-    os.kill(pid, signal.SIGKILL)
+    os.kill(pid_of_first(fleet / "o"), signal.SIGKILL)
     code, err = end(run)
     assert code == 0, err
     assert "dashboard http" in err

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,38 +33,57 @@ def planned(folder: Path, text: str, known=None):
     return plan_of(read_manifest(path), folder / "out", {} if known is None else known)
 
 
+def first(folder: Path, text: str, known):
+    return next(planned(folder, text, known).asked())
+
+
 def test_every_log_with_every_configuration_and_seed(folder):
     plan = planned(folder, 'logs = ["*/log.mcap"]\nmaps = ["floor.yaml"]\nseeds = [3, 4]\n' + TWO)
-    names = [run.name for run in plan.asked]
+    asked = list(plan.asked())
+    names = [run.name for run in asked]
     assert names == [f"{log}/{c}/seed-{s}" for log in ("hall", "lab") for c in "ab" for s in (3, 4)]
-    assert {run.map for run in plan.asked} == {"floor.yaml"}
-    assert plan.asked[2].settings == {"localize.particles": 300}
-    assert len({run.key for run in plan.asked}) == len(names)
-    pieces = list(plan.pieces({run.key for run in plan.asked}))
+    assert {run.map for run in asked} == {"floor.yaml"}
+    assert asked[2].settings == {"localize.particles": 300}
+    assert len({run.key for run in asked}) == len(names) == len(plan)
+    pieces = list(plan.pieces(lambda key: True))
     assert [[task.name for task in piece] for piece in pieces] == [names[:4], names[4:]]
     many = planned(folder, f'logs = ["hall"]\nseeds = {list(range(40))}')
-    assert [len(piece) for piece in many.pieces({r.key for r in many.asked})] == [PIECE, PIECE, 40 - 2 * PIECE]
+    assert [len(piece) for piece in many.pieces(lambda key: True)] == [PIECE, PIECE, 40 - 2 * PIECE]
 
 
 def test_the_key_is_of_contents_and_not_of_places(folder):
     text = 'logs = ["hall/log.mcap"]\nmaps = ["floor.yaml"]\n[settings.localize]\nparticles = 300\n'
     known = {}
-    before = planned(folder, text, known).asked[0]
-    assert planned(folder, text, known).asked[0] == before
+    before = first(folder, text, known)
+    assert first(folder, text, known) == before
     (folder / "floor.yaml").rename(folder / "other.yaml")
     (folder / "hall").rename(folder / "corridor")
     moved = text.replace("floor.yaml", "other.yaml").replace("hall", "corridor")
-    assert planned(folder, moved, known).asked[0].key == before.key
-    assert planned(folder, moved.replace("300", "301"), known).asked[0].key != before.key
-    assert planned(folder, "end_s = 5\n" + moved, known).asked[0].key != before.key
+    assert first(folder, moved, known).key == before.key
+    assert first(folder, moved.replace("300", "301"), known).key != before.key
+    assert first(folder, "end_s = 5\n" + moved, known).key != before.key
     (folder / "other.yaml").write_text("another map")
-    assert planned(folder, moved, known).asked[0].key != before.key
+    assert first(folder, moved, known).key != before.key
+
+
+def test_memory_does_not_grow_with_the_number_of_runs(folder):
+    def peak(seeds: int) -> int:
+        plan = planned(folder, f'logs = ["hall"]\nseeds = {list(range(seeds))}')
+        tracemalloc.start()
+        done = sum(len(piece) for piece in plan.pieces(lambda key: True)) + sum(1 for _ in plan.asked())
+        assert done == 2 * seeds
+        _, found = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        return found
+
+    peak(20)
+    assert peak(2000) < peak(200) + 20_000
 
 
 def test_copies_of_a_log_and_two_names_of_one_setting_are_runs_of_their_own(folder):
     (folder / "lab" / "log.mcap").write_bytes((folder / "hall" / "log.mcap").read_bytes())
     plan = planned(folder, 'logs = ["hall", "lab"]\n' + TWO.replace('settings = {"localize.particles" = 300}\n', ""))
-    assert len({run.key for run in plan.asked}) == len(plan.asked) == 4
+    assert len({run.key for run in plan.asked()}) == len(plan) == 4
 
 
 @pytest.mark.parametrize(
@@ -91,7 +111,7 @@ def test_what_is_wrong_is_said_before_anything_runs(folder, text, said):
 def test_a_map_beside_each_log_may_be_missing_for_one(folder):
     (folder / "hall" / "map.yaml").write_text("a map")
     plan = planned(folder, 'logs = ["hall", "lab"]\nmaps = ["beside:map.yaml"]')
-    assert [run.map for run in plan.asked] == ["hall/map.yaml", "lab/map.yaml"]
+    assert [run.map for run in plan.asked()] == ["hall/map.yaml", "lab/map.yaml"]
 
 
 def test_folders_are_searched_and_bags_are_one_log(folder):

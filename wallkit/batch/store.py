@@ -83,11 +83,16 @@ class Store:
 
     def add(self, outcome: Outcome, folder: str = "") -> None:
         """Note what came of a run; on the disk when this returns."""
-        values = [getattr(outcome, name) for name in _CAME]
-        values[_CAME.index("metrics")] = _text(outcome.metrics)
+        self.add_all([(outcome, folder)])
+
+    def add_all(self, outcomes: Iterable[tuple[Outcome, str]]) -> None:
+        """Note what came of some runs and where it lies; all on the disk when this returns, or none."""
         assignments = ", ".join(f"{name} = ?" for name in ("folder", *_CAME))
         with self.connection as rows:
-            rows.execute(f"UPDATE runs SET {assignments} WHERE key = ?", (folder, *values, outcome.key))
+            for outcome, folder in outcomes:
+                values = [getattr(outcome, name) for name in _CAME]
+                values[_CAME.index("metrics")] = _text(outcome.metrics)
+                rows.execute(f"UPDATE runs SET {assignments} WHERE key = ?", (folder, *values, outcome.key))
 
     def add_measures(self, measures: Iterable[Measure]) -> None:
         """Note what metrics are; those that are known stay as they are."""
@@ -95,10 +100,14 @@ class Store:
         with self.connection as connection:
             connection.executemany("INSERT OR IGNORE INTO measures VALUES (?, ?, ?, ?, ?)", rows)
 
-    def waiting(self) -> set[str]:
-        """Keys of the runs still to be done."""
-        sql = "SELECT key FROM runs WHERE planned AND status = 'waiting'"
-        return {key for (key,) in self.connection.execute(sql)}
+    def is_waiting(self, key: str) -> bool:
+        """Whether a run is still to be done."""
+        sql = "SELECT 1 FROM runs WHERE key = ? AND planned AND status = 'waiting'"
+        return self.connection.execute(sql, (key,)).fetchone() is not None
+
+    def name_of(self, key: str) -> str:
+        """The name of a run that is in the table."""
+        return str(self.connection.execute("SELECT name FROM runs WHERE key = ?", (key,)).fetchone()[0])
 
     def counts(self) -> dict[Status, int]:
         """Planned runs by status."""

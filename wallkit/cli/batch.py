@@ -169,14 +169,14 @@ def _line_printer() -> Callable[[int, int, int], None]:
 
 
 def _say_plan(read: Read, plan: Plan, out: Path) -> None:
-    logs = dict.fromkeys(run.log for run in plan.asked)
+    logs = dict.fromkeys(run.log for run in plan.asked())
     click.echo(f"job      {read.manifest.job}")
     click.echo(f"logs     {len(logs)}: {', '.join(list(logs)[:3])}{', ...' if len(logs) > 3 else ''}")
     for configuration in read.configurations:
         said = ", ".join(f"{key} = {value}" for key, value in configuration.flat.items()) or "the defaults"
         click.echo(f"settings {configuration.name}: {said}")
     click.echo(f"seeds    {', '.join(map(str, read.manifest.seeds))}")
-    click.echo(f"runs     {len(plan.asked)}")
+    click.echo(f"runs     {len(plan)}")
     click.echo(f"writes   {out}/  (dry run: nothing is written)")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from wallkit.errors import OutputError
@@ -92,13 +92,26 @@ def write_whole(path: Path, data: bytes) -> None:
     Raises:
         OutputError: it cannot be written.
     """
+    with whole_file(path) as working:
+        working.write_bytes(data)
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """A file to write beside another, whose place it takes when the block ends; see write_whole.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
     target = path.resolve()
     working = target.with_name(f".{target.name}.partial-{os.getpid()}")
     try:
-        working.write_bytes(data)
+        yield working
         if target.exists():
             working.chmod(target.stat().st_mode)
         working.replace(target)
     except OSError as error:
-        working.unlink(missing_ok=True)
         raise OutputError(f"cannot be written: {error.strerror}", where=path, hint="choose another place") from error
+    finally:
+        with suppress(OSError):
+            working.unlink(missing_ok=True)

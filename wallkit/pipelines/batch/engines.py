@@ -7,6 +7,7 @@ import logging
 import multiprocessing
 import os
 import threading
+from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -22,30 +23,59 @@ from wallkit.pipelines.batch.work import do_piece, failed, found_done
 Piece = tuple[Task, ...]
 Engine = Callable[[Iterator[Piece]], Iterator[list[Outcome]]]
 
-# pieces that are handed out before they are needed, for each process: the driver holds no more
+# pieces of a cluster that are handed out before they are needed, for each worker: the driver holds no more
 _AHEAD = 2
+# a run is given up when so many processes have died of it, as Dask does
+_DEATHS = 3
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 def local_engine(jobs: int) -> Engine:
-    """Processes of this machine, one thread each; one that dies takes one run with it, not the batch."""
+    """Processes of this machine, one thread each; one that dies is replaced, and its piece goes to another one."""
 
     def run(pieces: Iterator[Piece]) -> Iterator[list[Outcome]]:
         for name in _THREADS:
             os.environ.setdefault(name, "1")
-        broken: list[Piece] = []
-        yield from _through_pool(pieces, jobs, broken)
-        # whichever of them it was that killed its process: one at a time it can only be that one
-        while broken:
-            piece = broken.pop()
-            again: list[Piece] = []
-            yield from _through_pool(iter([piece]), 1, again)
-            if again:
-                outcomes, rest = without_killer(piece)
-                yield outcomes
-                broken += [rest] if rest else []
+        before = set(multiprocessing.active_children())
+        # a pool for each process: in one pool a death takes all others with it, and nobody knows whose it was
+        pools = [_pool() for _ in range(jobs)]
+        try:
+            yield from _through_pools(pieces, pools)
+        except BaseException:
+            # stopped: what they are at is begun again next time, what they have done stays
+            for process in set(multiprocessing.active_children()) - before:
+                process.terminate()
+            raise
+        finally:
+            for pool in pools:
+                pool.shutdown(wait=True, cancel_futures=True)
 
     return run
+
+
+def _through_pools(pieces: Iterator[Piece], pools: list[ProcessPoolExecutor]) -> Iterator[list[Outcome]]:
+    """Outcomes as they come; a pool whose process died is replaced in `pools`."""
+    free, running, again = list(range(len(pools))), dict[Future[list[Outcome]], tuple[int, Piece]](), list[Piece]()
+    deaths: Counter[str] = Counter()
+    while True:
+        while free and (piece := again.pop() if again else next(pieces, None)):
+            number = free.pop()
+            running[pools[number].submit(do_piece, piece, wallkit.__version__)] = number, piece
+        if not running:
+            return
+        for future in wait(running, return_when=FIRST_COMPLETED).done:
+            number, piece = running.pop(future)
+            free.insert(0, number)
+            try:
+                yield future.result()
+            except BrokenProcessPool:
+                pools[number].shutdown(wait=False)
+                pools[number] = _pool()
+                suspect = next((task.key for task in piece if found_done(task) is None), "")
+                deaths[suspect] += 1
+                outcomes, rest = without_killer(piece) if deaths[suspect] == _DEATHS else ([], piece)
+                again += [rest] if rest else []
+                yield outcomes
 
 
 def without_killer(piece: Piece) -> tuple[list[Outcome], Piece]:
@@ -58,37 +88,9 @@ def without_killer(piece: Piece) -> tuple[list[Outcome], Piece]:
     return outcomes, piece[len(known) + 1 :]
 
 
-def _through_pool(pieces: Iterator[Piece], jobs: int, broken: list[Piece]) -> Iterator[list[Outcome]]:
-    """Outcomes as they come; pieces of a pool that breaks are left in `broken`."""
+def _pool() -> ProcessPoolExecutor:
     # a fresh process: neither OpenGL nor the threads of libraries survive a fork
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_begin)
-    running: dict[Future[list[Outcome]], Piece] = {}
-    before = set(multiprocessing.active_children())
-    try:
-        while True:
-            for piece in itertools.islice(pieces, max(0, _AHEAD * jobs - len(running))):
-                running[pool.submit(do_piece, piece, wallkit.__version__)] = piece
-            if not running:
-                return
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                piece = running.pop(future)
-                try:
-                    outcomes = future.result()
-                except BrokenProcessPool:
-                    broken += [piece, *running.values()]
-                    running.clear()
-                    pool.shutdown(wait=False)
-                    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_begin)
-                    break
-                yield outcomes
-    except BaseException:
-        # stopped: what they are at is begun again next time, what they have done stays
-        for process in set(multiprocessing.active_children()) - before:
-            process.terminate()
-        raise
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+    return ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"), initializer=_begin)
 
 
 def _begin() -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -50,20 +50,76 @@ class Task:
 
 
 @dataclass(frozen=True)
+class Inputs:
+    """What the runs of one log, map and calibration share.
+
+    Attributes:
+        label: readable, and unique in the batch. files: absolute paths by role. contents: hash of their digests.
+    """
+
+    label: str
+    log: Path
+    files: Mapping[str, Sequence[str]]
+    contents: str
+
+
+@dataclass(frozen=True)
+class Variant:
+    """What the runs of one configuration share: its table over the shared settings, a hash of what follows, its model."""
+
+    configuration: Configuration
+    table: dict[str, Any]
+    effective: str
+    model: str
+    model_content: str
+
+
+@dataclass(frozen=True)
 class Plan:
-    """Everything a batch does, in the order in which it does it."""
+    """Everything a batch does, in the order in which it does it: runs are made as they are asked for, never all held."""
 
-    asked: tuple[Asked, ...]
-    tasks: tuple[Task, ...] = field(repr=False)
+    manifest: Manifest
+    inputs: tuple[Inputs, ...]
+    variants: tuple[Variant, ...]
+    out: Path
+    home: Path
+    reports: bool = False
 
-    def pieces(self, keys: set[str]) -> Iterator[tuple[Task, ...]]:
-        """The runs with these keys; those of one log together."""
-        wanted = (task for task in self.tasks if task.key in keys)
+    def __len__(self) -> int:
+        return len(self.inputs) * len(self.variants) * len(self.manifest.seeds)
+
+    def asked(self) -> Iterator[Asked]:
+        """The runs as the table has them."""
+        for name, key, inputs, variant, seed in self._runs():
+            calibrations = "+".join(_word(Path(p), self.home) for p in inputs.files["calibrations"])
+            yield Asked(
+                name, key, self.manifest.job, _word(inputs.log, self.home), _word_of(inputs.files["map"], self.home),
+                calibrations, variant.configuration.name, seed, wallkit.__version__, variant.configuration.flat,
+            )  # fmt: skip
+
+    def tasks(self) -> Iterator[Task]:
+        """The runs as workers get them."""
+        for name, key, inputs, variant, seed in self._runs():
+            files = inputs.files
+            yield Task(
+                name, key, str(inputs.log), "".join(files["map"]), tuple(files["calibrations"]),
+                "".join(files["truth"]) or self.manifest.truth, variant.model, seed, self.manifest, variant.table,
+                str(self.out.absolute() / "runs" / name), str(self.home), self.reports,
+            )  # fmt: skip
+
+    def pieces(self, is_wanted: Callable[[str], bool]) -> Iterator[tuple[Task, ...]]:
+        """The runs whose keys are wanted; those of one log together."""
+        size = PIECE if self.manifest.job == "localize" else ALONE
+        wanted = (task for task in self.tasks() if is_wanted(task.key))
         for _, of_log in itertools.groupby(wanted, key=lambda task: task.log):
-            runs = list(of_log)
-            size = PIECE if runs[0].manifest.job == "localize" else ALONE
-            for start in range(0, len(runs), size):
-                yield tuple(runs[start : start + size])
+            while piece := tuple(itertools.islice(of_log, size)):
+                yield piece
+
+    def _runs(self) -> Iterator[tuple[str, str, Inputs, Variant, int]]:
+        """(name, key, inputs, variant, seed) of every run."""
+        for inputs, variant, seed in itertools.product(self.inputs, self.variants, self.manifest.seeds):
+            name = f"{inputs.label}/{variant.configuration.name}/seed-{seed}"
+            yield name, _key(name, self.manifest, inputs, variant), inputs, variant, seed
 
 
 def plan_of(read: Read, out: Path, known: Digests, *, reports: bool = False) -> Plan:
@@ -80,42 +136,29 @@ def plan_of(read: Read, out: Path, known: Digests, *, reports: bool = False) -> 
     is_simulation = manifest.job == "simulate"
     logs = find_logs(manifest.logs, folder, suffixes=(".toml",) if is_simulation else LOGS, where=where)
     _check_words(manifest, folder, where)
-    maps = manifest.maps or ("",)
-    calibrations = manifest.calibrations or ("",)
-    tables = [(c, *_effective(c, read)) for c in read.configurations]
-    asked, tasks, seen = [], [], set()
+    maps, calibrations = manifest.maps or ("",), manifest.calibrations or ("",)
+    inputs: dict[str, Inputs] = {}
     for log, name in zip(logs, short_names(logs), strict=True):
         for (map_word, map_name), (cal_words, cal_name) in itertools.product(_named(maps), _named(calibrations)):
+            label = name + (f"@{map_name}" if len(maps) > 1 else "") + (f"+{cal_name}" if len(calibrations) > 1 else "")
+            if label in inputs:
+                raise ConfigError(f"two runs are named '{label}'", where=where, hint="rename a map or a calibration")
             files = _files(manifest, log, map_word, cal_words, folder)
             contents = {role: [digest(Path(p), known) for p in paths] for role, paths in files.items()}
-            label = name + (f"@{map_name}" if len(maps) > 1 else "") + (f"+{cal_name}" if len(calibrations) > 1 else "")
-            for (configuration, table, effective), seed in itertools.product(tables, manifest.seeds):
-                model = _file_or_word(configuration.model or manifest.model, folder)
-                run = f"{label}/{configuration.name}/seed-{seed}"
-                key = _key(run, manifest, contents, _with_content(effective, known), _content_of(model, known))
-                if run in seen:
-                    raise ConfigError(f"two runs are named '{run}'", where=where, hint="rename a map or a calibration")
-                seen.add(run)
-                asked.append(
-                    Asked(
-                        run, key, manifest.job, _word(log, folder), _word_of(files["map"], folder),
-                        "+".join(_word(Path(p), folder) for p in files["calibrations"]), configuration.name, seed,
-                        wallkit.__version__, configuration.flat,
-                    )
-                )  # fmt: skip
-                tasks.append(
-                    Task(
-                        run, key, str(log), "".join(files["map"]), tuple(files["calibrations"]),
-                        "".join(files["truth"]) or manifest.truth, model, seed, manifest, table,
-                        str(out.absolute() / "runs" / run), str(folder), reports,
-                    )
-                )  # fmt: skip
-    return Plan(tuple(asked), tuple(tasks))
+            inputs[label] = Inputs(label, log, files, _hash(contents))
+    variants = tuple(_variant(configuration, read, known) for configuration in read.configurations)
+    return Plan(manifest, tuple(inputs.values()), variants, out, folder, reports)
 
 
 def settings_of(manifest: Manifest, table: dict[str, Any]) -> Any:
     """The settings class of the job, filled from a table."""
     return build(Scenario if manifest.job == "simulate" else Config, [Source(table, "[settings]")])[0]
+
+
+def _variant(configuration: Configuration, read: Read, known: Digests) -> Variant:
+    table, effective = _effective(configuration, read)
+    model = _file_or_word(configuration.model or read.manifest.model, read.path.absolute().parent)
+    return Variant(configuration, table, _hash(_with_content(effective, known)), model, _content_of(model, known))
 
 
 def _effective(configuration: Configuration, read: Read) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -165,16 +208,19 @@ def _check_words(manifest: Manifest, folder: Path, where: str) -> None:
         raise ConfigError("calib verify needs a calibration", where=where, hint='calibrations = ["front.toml"]')
 
 
-def _key(run: str, manifest: Manifest, contents: Any, effective: Any, model: str) -> str:
+def _key(run: str, manifest: Manifest, inputs: Inputs, variant: Variant) -> str:
     """Equal for runs of one name that must have equal results; where files lie is no part of it.
 
     The name, which has the seed in it, tells apart what is the same twice: a copy of a log, or two names of one setting.
     """
     m = manifest
     words = [run, m.job, m.truth if not m.truth.endswith(".tum") else "", m.init, m.start_s, m.end_s, m.fallback]
-    words += [m.board if not contents["board"] else "", m.lidar_sigma, model, wallkit.__version__]
-    text = json.dumps([words, contents, effective], sort_keys=True, default=str)
-    return hashlib.sha256(text.encode()).hexdigest()[:32]
+    words += [m.board if not inputs.files["board"] else "", m.lidar_sigma, variant.model_content, wallkit.__version__]
+    return _hash([words, inputs.contents, variant.effective])
+
+
+def _hash(value: Any) -> str:
+    return hashlib.sha256(json.dumps(value, sort_keys=True, default=str).encode()).hexdigest()[:32]
 
 
 def _with_content(effective: dict[str, Any], known: Digests) -> dict[str, Any]:

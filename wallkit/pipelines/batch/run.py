@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import csv
-import io
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import wallkit
+from wallkit.batch.rows import Outcome
 from wallkit.batch.store import LOCK, Store, is_batch, read_measures, read_rows
 from wallkit.pipelines.batch.engines import Engine
 from wallkit.pipelines.batch.jobs import measures_of
 from wallkit.pipelines.batch.manifest import Read
 from wallkit.pipelines.batch.plan import Plan
 from wallkit.pipelines.batch.work import found_done
-from wallkit.pipelines.outputs import check_out, write_whole
+from wallkit.pipelines.outputs import check_out, whole_file
 
 CSV = "batch.csv"
 Observe = Callable[[int, int, int], None]
@@ -50,31 +50,29 @@ def run_batch(
         "swept": read.swept,
         "configurations": [c.name for c in read.configurations],
     }
-    store.plan(plan.asked, about)
+    store.plan(plan.asked(), about)
     store.add_measures(measures_of(read.manifest.job))
     if retry:
         store.forget_failures()
     _sweep_up(store.folder)
     _adopt(plan, store)
-    names = {task.key: task.name for task in plan.tasks}
     counts = store.counts()
     ended, bad = counts["done"] + counts["failed"], counts["failed"]
     before = ended
-    observe(ended, len(plan.tasks), bad)
+    observe(ended, len(plan), bad)
     try:
-        for outcomes in engine(plan.pieces(store.waiting())):
-            for outcome in outcomes:
-                is_done = outcome.status == "done"
-                store.add(outcome, f"runs/{names[outcome.key]}" if is_done else "")
-                ended, bad = ended + 1, bad + (not is_done)
-            observe(ended, len(plan.tasks), bad)
+        for outcomes in engine(plan.pieces(store.is_waiting)):
+            store.add_all([(came, _folder(store.name_of(came.key), came)) for came in outcomes])
+            ended, bad = ended + len(outcomes), bad + sum(came.status == "failed" for came in outcomes)
+            observe(ended, len(plan), bad)
     finally:
-        write_whole(store.folder / CSV, csv_of(store.folder).encode())
-    return Ended(len(plan.tasks), before, bad)
+        with whole_file(store.folder / CSV) as path, path.open("w", encoding="utf-8", newline="") as file:
+            write_csv(store.folder, file)
+    return Ended(len(plan), before, bad)
 
 
-def csv_of(folder: Path) -> str:
-    """The table, sorted by run; columns that differ from machine to machine are last and begin with `timing.`."""
+def write_csv(folder: Path, file: TextIO) -> None:
+    """The table by run, a line at a time; columns that differ from machine to machine are last and begin with `timing.`."""
     measures = read_measures(folder)
     settings: dict[str, None] = {}
     metrics: dict[str, None] = {}
@@ -85,8 +83,7 @@ def csv_of(folder: Path) -> str:
     numbers = [key for key in sorted(metrics) if key not in timings]
     asked = ("name", "job", "log", "map", "calibration", "configuration", "seed", "version", "key")
     came, when = ("status", "verdict", "exit_code", "message"), ("worker", "started", "seconds", "cpu_s")
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
+    writer = csv.writer(file, lineterminator="\n")
     writer.writerow(
         [*asked, *came, "folder", *(f"set.{key}" for key in sorted(settings)), *(f"metrics.{key}" for key in numbers)]
         + [f"timing.{key}" for key in (*when, *timings)]
@@ -98,7 +95,6 @@ def csv_of(folder: Path) -> str:
         cells += [_cell(o.metrics.get(key)) for key in numbers]
         cells += [getattr(o, key) for key in when] + [_cell(o.metrics.get(key)) for key in timings]
         writer.writerow(cells)
-    return text.getvalue()
 
 
 def failures(folder: Path) -> Iterator[tuple[str, str, str]]:
@@ -110,10 +106,13 @@ def failures(folder: Path) -> Iterator[tuple[str, str, str]]:
 
 def _adopt(plan: Plan, store: Store) -> None:
     """Note the runs that are done but not in the table: the driver died before it heard of them."""
-    waiting = store.waiting()
-    for task in plan.tasks:
-        if task.key in waiting and (outcome := found_done(task)) is not None:
-            store.add(outcome, f"runs/{task.name}")
+    for task in plan.tasks():
+        if store.is_waiting(task.key) and (outcome := found_done(task)) is not None:
+            store.add(outcome, _folder(task.name, outcome))
+
+
+def _folder(name: str, outcome: Outcome) -> str:
+    return f"runs/{name}" if outcome.status == "done" else ""
 
 
 def _sweep_up(folder: Path) -> None:

@@ -44,12 +44,13 @@ class AuditRequest:
     Attributes:
         truth: a TUM file, a topic, "log" for what the log calls its truth; None without. run: folder of a finished run.
             Without both the log is localized in the map itself.
-        init: where localizing starts. select, ignore: of the rules.
+        today: ignores that ended before it do not count; of None all do. init: where localizing starts.
+        select, ignore: of the rules.
     """
 
     map: Path
     logs: tuple[Path, ...]
-    today: datetime.date
+    today: datetime.date | None
     truth: str | None = None
     run: Path | None = None
     init: str | None = None
