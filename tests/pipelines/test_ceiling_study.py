@@ -6,8 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from wallkit.core.ceiling import CeilingMap
 from wallkit.errors import OutputError
 from wallkit.pipelines.bench.ceiling import MODELS, Outcome, Task, judged, summary
+from wallkit.pipelines.bench.ceiling_picture import slopes_along
 from wallkit.pipelines.bench.ceiling_rows import read_rows, task_of, write_rows
 
 STAMPS = np.arange(300, dtype=np.int64) * 100_000_000
@@ -75,3 +77,12 @@ def test_the_first_localizer_sees_unblurred_views() -> None:
     assert {name: Task("", name, "own", "", "", None, 1).settings.ceiling.smooth_m for name in MODELS} == {
         "seed": 0.0, "centre": 0.04, "histogram": 0.04, "gradient": 0.04, "patch": 0.04
     }  # fmt: skip
+
+
+def test_the_slope_of_a_ramp_is_that_of_the_ramp() -> None:
+    # red rises by 1 in 4 m along x, green by 1 in 2 m along y
+    y, x = np.mgrid[0:200, 0:400] * 0.01
+    pixels = np.stack([255 * x / 4, 255 * y / 2, np.zeros_like(x)], axis=2).round().astype(np.uint8)
+    ceiling = CeilingMap(pixels, np.ones(pixels.shape[:2], bool), 0.01, np.array([5.0, 1.0, 0.0]), 2.7, "ramp")
+    slopes = slopes_along(ceiling, np.array([[6.0, 2.0, 0.0], [8.0, 2.5, 1.0]]))
+    np.testing.assert_allclose(slopes, math.hypot(1 / 4, 1 / 2), rtol=0.02)

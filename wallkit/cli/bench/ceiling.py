@@ -128,6 +128,8 @@ def _study(
     """The rows that were asked for, run or found in the file."""
     from itertools import product
 
+    import numpy as np
+
     from wallkit.pipelines.bench.ceiling import MODELS, Task, kidnapped, read_world, study
     from wallkit.pipelines.bench.ceiling_picture import places_picture
     from wallkit.pipelines.bench.ceiling_rows import read_rows, task_of, write_rows, write_track
@@ -154,7 +156,11 @@ def _study(
                     tracks.mkdir(parents=True, exist_ok=True)
                     name = "-".join([row.world, row.model, row.resampler, row.init, row.story])
                     write_track(tracks / f"{name}.csv", told.stamps_ns, told.truth, done)
-                    write_whole(tracks / f"{name}.png", places_picture(told.ceiling, told.truth, done, row.model))
+                    near = np.mean([one.is_near for one in done], axis=0)
+                    title = f"{row.model}: its {row.seeds} runs are near the truth {row.share_near:.0%} of the time"
+                    seconds = (told.stamps_ns - told.stamps_ns[0]) / 1e9
+                    drawn = places_picture(told.ceiling, told.truth, seconds, near, title)
+                    write_whole(tracks / f"{name}.png", drawn)
         found += [kept[task] for task in tasks]
     return found
 

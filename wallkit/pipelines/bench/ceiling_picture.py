@@ -11,7 +11,7 @@ import numpy as np
 from wallkit.core.ceiling import CeilingMap
 from wallkit.core.geometry import invert, transform_points
 from wallkit.core.types import Float64Array
-from wallkit.pipelines.bench.ceiling import MODELS, Outcome, Row
+from wallkit.pipelines.bench.ceiling import MODELS, Row
 from wallkit.report import canvas
 
 if TYPE_CHECKING:
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WIDTH_IN = 10.0
+# sigma over which the slope of colours is taken
+_GRAIN_M = 0.1
 # of a path: none of the runs knows its place, half, all of them; told apart with every common colour blindness
 _NEVER, _SOME, _ALWAYS = canvas.VERMILION, "#f7e9c8", canvas.BLUE
 
@@ -57,37 +59,67 @@ def bars_picture(rows: Sequence[Row]) -> bytes:
             axes.set_yticks(range(len(names)), names if axes is panels[0] else [""] * len(names), fontsize=11)
             axes.tick_params(length=0)
             axes.spines[["left", "bottom"]].set_visible(False)
-        _small_print(figure, ((canvas.BLUE, "runs that converged"), ("#a9cfe6", "came near the truth, and lost it")))
+        _small_print(figure, ((canvas.BLUE, "runs that converged"), ("#a9cfe6", "came near the truth, did not stay")))
         return _png(figure)
 
 
-def places_picture(ceiling: CeilingMap, truth: Float64Array, done: Sequence[Outcome], name: str) -> bytes:
-    """PNG: the path over the ceiling, in the colour of how many of the runs knew their place there.
+def places_picture(
+    ceiling: CeilingMap, truth: Float64Array, seconds: Float64Array, near: Float64Array, title: str
+) -> bytes:
+    """PNG: share of the runs that were near over time and, above it, along the path; where colours run smoothest is grey.
 
     Args:
-        truth: (T, 3) where the robot truly was. done: runs over it. name: of their model.
+        truth: (T, 3) where the robot truly was. seconds: (T,). near: (T,) share of the runs that were near it.
     """
     from matplotlib.collections import LineCollection
     from matplotlib.colors import LinearSegmentedColormap
 
-    near = np.mean([one.is_near for one in done], axis=0)
     xy = transform_points(invert(ceiling.origin), truth[:, :2])
     low, high = xy.min(axis=0) - 1.0, xy.max(axis=0) + 1.0
     shades = LinearSegmentedColormap.from_list("near", [_NEVER, _SOME, _ALWAYS])
     width, height = (high - low).tolist()
+    slopes = slopes_along(ceiling, truth)
+    smooth = slopes < np.quantile(slopes, 1 / 3)
     with canvas.style():
-        figure, (axes,) = _panels(1, (_WIDTH_IN - 0.4) * height / width + 0.8, left_in=0.1)
-        axes.imshow(ceiling.pixels, origin="lower", extent=(0, ceiling.size_m[0], 0, ceiling.size_m[1]))
-        pieces = list(np.stack([xy[:-1], xy[1:]], axis=1))
-        axes.add_collection(LineCollection(pieces, colors="white", linewidths=9, capstyle="round"))
-        axes.add_collection(LineCollection(pieces, colors=shades(near[1:]), linewidths=6, capstyle="round"))
-        axes.plot(*xy[0], "o", color=canvas.INK, markersize=9)
-        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xticks=[], yticks=[])
-        title = f"{name}: its {len(done)} runs know where they are {near.mean():.0%} of the time"
-        axes.set_title(title, fontsize=12, fontweight="bold", loc="left")
-        words = ((_NEVER, "none of the runs knows its place"), (_SOME, "half of them"), (_ALWAYS, "all"))
-        _small_print(figure, (*words, (canvas.INK, "start")))
+        up_in = (_WIDTH_IN - 0.4) * height / width
+        figure, (plan, over_time) = _stack((up_in, 1.5))
+        plan.imshow(ceiling.pixels, origin="lower", extent=(0, ceiling.size_m[0], 0, ceiling.size_m[1]))
+        pieces = np.stack([xy[:-1], xy[1:]], axis=1)
+        plan.add_collection(LineCollection(list(pieces), colors="white", linewidths=11, capstyle="round"))
+        plan.add_collection(LineCollection(list(pieces[smooth[1:]]), colors=canvas.INK, linewidths=11, capstyle="butt"))
+        plan.add_collection(LineCollection(list(pieces), colors=shades(near[1:]), linewidths=6, capstyle="round"))
+        plan.plot(*xy[0], "o", color=canvas.INK, markersize=11)
+        plan.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xticks=[], yticks=[])
+        plan.set_title(title, fontsize=12, fontweight="bold", loc="left")
+        over_time.fill_between(seconds, 0, 100, where=smooth, color="#c9ced3", linewidth=0, step="mid")
+        over_time.plot(seconds, 100 * near, color=canvas.BLUE, linewidth=2)
+        over_time.set(xlim=(seconds[0], seconds[-1]), ylim=(0, 100), yticks=(0, 50, 100), xlabel="s")
+        over_time.set_yticklabels(["0 %", "50 %", "100 %"])
+        words = ((_NEVER, "no run near"), (_SOME, "half of them"), (_ALWAYS, "all of them"))
+        _small_print(figure, (*words, ("#c9ced3", "the smoothest third (black edge on the plan)")))
         return _png(figure)
+
+
+def slopes_along(ceiling: CeilingMap, truth: Float64Array) -> Float64Array:
+    """(T,) change of colour per metre at the robot: channels from 0 to 1, root of the sum of squares, grain blurred away."""
+    import cv2
+
+    pixels = cv2.GaussianBlur(ceiling.pixels.astype(np.float32) / 255, (0, 0), _GRAIN_M / ceiling.resolution_m)
+    down, across = np.gradient(pixels, ceiling.resolution_m, axis=(0, 1))
+    cells, _ = ceiling.cells_at(truth[:, :2])
+    rows, columns = cells.T
+    return np.asarray(np.sqrt((down[rows, columns] ** 2 + across[rows, columns] ** 2).sum(axis=1)), dtype=np.float64)
+
+
+def _stack(heights_in: tuple[float, float]) -> tuple[Figure, tuple[Axes, Axes]]:
+    from matplotlib.figure import Figure
+
+    first, second = heights_in
+    total = first + second + 1.35
+    figure = Figure(figsize=(_WIDTH_IN, total), dpi=110)
+    lower = figure.add_axes((0.065, 0.8 / total, 0.915, second / total))
+    upper = figure.add_axes((0.02, (0.8 + second + 0.2) / total, 0.96, first / total))
+    return figure, (upper, lower)
 
 
 def _panels(number: int, height_in: float, left_in: float = 0.95) -> tuple[Figure, list[Axes]]:
