@@ -60,7 +60,7 @@ def _through_pools(pieces: Iterator[Piece], pools: list[ProcessPoolExecutor]) ->
     while True:
         while free and (piece := again.pop() if again else next(pieces, None)):
             number = free.pop()
-            running[pools[number].submit(do_piece, piece, wallkit.__version__)] = number, piece
+            running[_submitted(pools, number, piece)] = number, piece
         if not running:
             return
         for future in wait(running, return_when=FIRST_COMPLETED).done:
@@ -76,6 +76,16 @@ def _through_pools(pieces: Iterator[Piece], pools: list[ProcessPoolExecutor]) ->
                 outcomes, rest = without_killer(piece) if deaths[suspect] == _DEATHS else ([], piece)
                 again += [rest] if rest else []
                 yield outcomes
+
+
+def _submitted(pools: list[ProcessPoolExecutor], number: int, piece: Piece) -> Future[list[Outcome]]:
+    try:
+        return pools[number].submit(do_piece, piece, wallkit.__version__)
+    except BrokenProcessPool:
+        # it died while it had nothing to do
+        pools[number].shutdown(wait=False)
+        pools[number] = _pool()
+        return pools[number].submit(do_piece, piece, wallkit.__version__)
 
 
 def without_killer(piece: Piece) -> tuple[list[Outcome], Piece]:
