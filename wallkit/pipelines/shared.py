@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wallkit.core.types import CameraImage, Frame
+from wallkit.core.types import CameraImage, Frame, Points
 from wallkit.logs.loss import Loss
 from wallkit.logs.reader import Log, open_log
 from wallkit.logs.rig import Rig
@@ -116,9 +116,9 @@ class _Room:
         return len(image.data)
 
 
-def _bytes_of(item: object) -> int:
-    """Of the arrays that a dataclass with slots holds."""
-    values = (getattr(item, name) for name in type(item).__slots__)  # type: ignore[attr-defined]
+def _bytes_of(item: Frame | Points) -> int:
+    """Of the arrays that it holds itself."""
+    values = (getattr(item, field.name) for field in fields(item))
     return sum(value.nbytes for value in values if isinstance(value, np.ndarray))
 
 

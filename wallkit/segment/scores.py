@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -141,7 +142,7 @@ def _shares(scores: Float32Array, *, is_probability: bool) -> Float32Array:
 
 
 @njit(cache=True, nogil=True)
-def _sample(pixels, scores, lies, is_probability, labels, sure):  # type: ignore[no-untyped-def]
+def _sample(pixels: Any, scores: Any, lies: Any, is_probability: Any, labels: Any, sure: Any) -> None:
     """Fills labels and sure (K,) for pixels (K, 2); `lies` says where they are in the grid, as ScoreMap._cells."""
     width, height, gain_u, gain_v, left_px, top_px, cell_u, cell_v = lies
     rows, columns, classes = scores.shape
@@ -174,7 +175,7 @@ def _sample(pixels, scores, lies, is_probability, labels, sure):  # type: ignore
 
 
 @njit(cache=True, nogil=True)
-def _highest(scores, columns, rows):  # type: ignore[no-untyped-def]
+def _highest(scores: Any, columns: Any, rows: Any) -> Any:
     """(H, W) the class with the highest bilinear score at rows (H,) and columns (W,)."""
     height, width, classes = scores.shape
     out = np.empty((len(rows), len(columns)), dtype=np.int64)

@@ -84,35 +84,6 @@ class Outcome:
 
 
 @dataclass(frozen=True)
-class Row:
-    """Runs of one configuration in one world: medians over those that have the number, `lost` and `back` of all of them.
-
-    Attributes:
-        came: runs that were near the truth for a second. share_near: of all views of all runs, those at which it was near.
-        back: losses made good. back_updates: after how many.
-    """
-
-    world: str
-    model: str
-    resampler: str
-    init: str
-    story: str
-    end_s: float | None
-    seeds: int
-    converged: int
-    came: int
-    first: float
-    updates: float
-    error_m: float
-    error_deg: float
-    share_near: float
-    lost: int
-    back: int
-    back_updates: float
-    ms_per_update: float
-
-
-@dataclass(frozen=True)
 class Task:
     """A configuration to run: a world's name and what is done in it; `end_s` from the first view on."""
 
@@ -130,6 +101,28 @@ class Task:
         words = list(MODELS[self.model])
         words += [] if self.resampler == "own" else [f"resampler={self.resampler}", "resample_when=always"]
         return build(LocalizeSettings, [source_from_words(words)])[0]
+
+
+@dataclass(frozen=True)
+class Row(Task):
+    """What a task came to: medians over those that have the number, `lost` and `back` of all of them.
+
+    Attributes:
+        came: runs that were near the truth for a second. share_near: of all views of all runs, those at which it was near.
+        back: losses made good. back_updates: after how many.
+    """
+
+    converged: int
+    came: int
+    first: float
+    updates: float
+    error_m: float
+    error_deg: float
+    share_near: float
+    lost: int
+    back: int
+    back_updates: float
+    ms_per_update: float
 
 
 def read_world(
