@@ -137,27 +137,22 @@ def _located(kernel: Any, points: ArrayLike, polygons: Polygons) -> Int64Array:
 # ------------------------------------------------------------------------------------------------------- the kernels
 
 
-@njit(inline="always")
-def holds(x: Any, y: Any, edges: Any, boxes: Any, bands: Any, members: Any, p: int) -> Any:
-    """Whether packed polygon p holds a point, by the crossing number; for compiled code that asks for one at a time."""
-    crossed = 0
-    if _is_in_box(x, y, boxes, p):
-        band = _band_of(y, boxes, p, bands.shape[1] - 1)
-        for m in range(bands[p, band], bands[p, band + 1]):
-            e = members[m]
-            y0 = edges[1, e]
-            spans = (y0 > y) != (edges[3, e] > y)
-            crossed += spans & (x < edges[0, e] + (y - y0) * edges[4, e])
-    return crossed & 1 == 1
-
-
 @njit(cache=True, nogil=True)
 def _crossing(points: Any, edges: Any, boxes: Any, bands: Any, members: Any, found: Any) -> None:
     for k in range(len(points)):
         x, y = points[k, 0], points[k, 1]
         found[k] = -1
         for p in range(len(boxes)):
-            if holds(x, y, edges, boxes, bands, members, p):
+            if not _is_in_box(x, y, boxes, p):
+                continue
+            crossed = 0
+            band = _band_of(y, boxes, p, bands.shape[1] - 1)
+            for m in range(bands[p, band], bands[p, band + 1]):
+                e = members[m]
+                y0 = edges[1, e]
+                spans = (y0 > y) != (edges[3, e] > y)
+                crossed += spans & (x < edges[0, e] + (y - y0) * edges[4, e])
+            if crossed & 1:
                 found[k] = p
                 break
 

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from wallkit.core.polygon import Polygons, crossing_number, holds
+from wallkit.core.polygon import Polygons, crossing_number
 from wallkit.core.types import Float32Array, Float64Array, Int64Array
 
 # an edge takes up little of a tile of this side [px], and the table of a VGA image stays in a core's own cache
@@ -165,7 +165,7 @@ def _look_up(
         region = _beside(i, j, regions)
         if region >= 0:
             asked, every, beside = touching[i, j], False, answers[region]
-        p, holder = -1, -1
+        p, holds = -1, -1
         while True:
             if every:
                 p += 1
@@ -176,11 +176,21 @@ def _look_up(
                 asked &= asked - _ONE
                 if p == len(boxes) or p > beside >= 0:
                     # what holds the tile beside holds this point too
-                    holder = beside
+                    holds = beside
                     break
                 # unless it is in question itself: then nothing is known of those after it
                 every = p == beside
-            if holds(x, y, edges, boxes, bands, members, p):
-                holder = p
-                break
-        found[k], confidences[k] = labels[holder], sure[holder]
+            low, high = boxes[p, 1], boxes[p, 3]
+            if boxes[p, 0] <= x and x <= boxes[p, 2] and low <= y and y <= high:
+                # as polygon._crossing, written out: as one function for both this takes 0.21 ms of 1,080 points instead of 0.12
+                crossed, count = 0, bands.shape[1] - 1
+                band = min(count - 1, max(0, int((y - low) / (high - low) * count))) if high > low else 0
+                for m in range(bands[p, band], bands[p, band + 1]):
+                    e = members[m]
+                    y0 = edges[1, e]
+                    spans = (y0 > y) != (edges[3, e] > y)
+                    crossed += spans & (x < edges[0, e] + (y - y0) * edges[4, e])
+                if crossed & 1:
+                    holds = p
+                    break
+        found[k], confidences[k] = labels[holds], sure[holds]
