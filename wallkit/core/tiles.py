@@ -182,7 +182,7 @@ def _look_up(
                 every = p == beside
             low, high = boxes[p, 1], boxes[p, 3]
             if boxes[p, 0] <= x and x <= boxes[p, 2] and low <= y and y <= high:
-                # as polygon._crossing, written out: as one function for both this takes 0.21 ms of 1,080 points instead of 0.12
+                # as polygon._crossing, written out: one function for both takes 0.21 ms instead of 0.12 (bench filter)
                 crossed, count = 0, bands.shape[1] - 1
                 band = min(count - 1, max(0, int((y - low) / (high - low) * count))) if high > low else 0
                 for m in range(bands[p, band], bands[p, band + 1]):
