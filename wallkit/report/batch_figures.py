@@ -168,7 +168,7 @@ def factor_figure(data: BatchData, factor: Factor) -> Picture | None:
     """A line for each configuration over the levels, with intervals; six at most, the best of each level among them."""
     if len(factor.levels) < 2:
         return None
-    names = _chosen(data, factor)
+    names = _chosen(data)
     rows = [names[at : at + 4] for at in range(0, len(names), 4)]
     figure = canvas.new_figure(3.9 + 0.22 * len(rows))
     axes = canvas.add_axes(figure, (0.85, 0.6, canvas.WIDTH_IN - 1.0, 3.0))
@@ -325,7 +325,7 @@ def _effect(axes: Axes, effect: Effect, ends: Sequence[float], data: BatchData, 
         axes.plot([i], [mean.value], "o", color=canvas.VERMILION, markersize=7, markeredgecolor="white")
 
 
-def _chosen(data: BatchData, factor: Factor) -> list[str]:
+def _chosen(data: BatchData) -> list[str]:
     """The baseline, then by mean from the best on, six in all."""
     means = {s.name: s.numbers[data.key].mean.value for s in data.summaries if data.key in s.numbers}
     order = sorted(means, key=lambda name: (name != data.baseline, means[name]))
