@@ -87,8 +87,9 @@ def manifest_page() -> str:
     """Everything that the manifest of a batch can say."""
     intro = (
         "What `wallkit batch MANIFEST` runs: every log x map x calibration x configuration x seed. Paths are from the"
-        " manifest's folder; `beside:NAME` is a file in the folder of each log. How to write one: [Run many"
-        " logs](../how-to/run-many-logs.md)."
+        " manifest's folder; `beside:NAME` is a file in the folder of each log. Logs, maps, calibrations, truth, board,"
+        " robot and model may be addresses, [s3:// and others](../how-to/run-many-logs.md#logs-in-a-bucket)."
+        " How to write one: [Run many logs](../how-to/run-many-logs.md)."
     )
     tables = (
         (

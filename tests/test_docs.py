@@ -233,6 +233,7 @@ def test_the_readmes_test_command_installs_what_the_tests_need():
         "mypy",
         "dask",
         "distributed",
+        "fsspec[http]",
     } == {re.split(r"[<>=]", name)[0] for name in project["optional-dependencies"]["test"]}
 
 

@@ -116,14 +116,14 @@ def test_a_map_beside_each_log_may_be_missing_for_one(folder):
 
 def test_folders_are_searched_and_bags_are_one_log(folder):
     (folder / "lab" / "metadata.yaml").write_text("")
-    assert find_logs(["."], folder, where="") == [folder / "hall" / "log.mcap", folder / "lab"]
-    assert find_logs(["hall/log.mcap", "*/log.mcap"], folder, where="")[0] == folder / "hall" / "log.mcap"
+    assert find_logs(["."], folder, where="") == [str(folder / "hall" / "log.mcap"), str(folder / "lab")]
+    assert find_logs(["hall/log.mcap", "*/log.mcap"], folder, where="")[0] == str(folder / "hall" / "log.mcap")
 
 
 def test_short_names_tell_apart():
-    assert short_names([Path("/x/a.mcap"), Path("/x/b.mcap")]) == ["a", "b"]
-    assert short_names([Path("/a/log.mcap"), Path("/b/log.mcap")]) == ["a", "b"]
-    assert short_names([Path("/a/1.bag"), Path("/a/2.bag"), Path("/b/1.bag")]) == ["a-1", "a-2", "b-1"]
+    assert short_names(["/x/a.mcap", "/x/b.mcap"]) == ["a", "b"]
+    assert short_names(["/a/log.mcap", "/b/log.mcap"]) == ["a", "b"]
+    assert short_names(["/a/1.bag", "/a/2.bag", "/b/1.bag"]) == ["a-1", "a-2", "b-1"]
 
 
 def test_a_digest_is_remembered_until_the_file_changes(folder):

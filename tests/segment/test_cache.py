@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from tests.segment.drawn import colour_oracle, picture
+from wallkit.core.folders import cache_folder
 from wallkit.core.types import CameraImage
-from wallkit.segment.cache import cache_of, users_folder
+from wallkit.segment.cache import cache_of
 from wallkit.segment.layouts import LAYOUTS
 from wallkit.segment.onnx_segmenter import load_segmenter
 from wallkit.segment.settings import SegmentSettings
@@ -116,6 +117,6 @@ def test_no_folder_no_cache_and_the_users_own(tmp_path, monkeypatch):
     assert cache_of(segmenter, "") is None
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
     monkeypatch.setattr("sys.platform", "linux")
-    assert users_folder() == tmp_path / "home" / "wallkit" / "segmentations"
+    assert cache_folder("segmentations") == tmp_path / "home" / "wallkit" / "segmentations"
     cache_of(segmenter, "user").keep(image_of(noisy()), segmenter.segment(noisy()), 1.0)
     assert len(files_in(tmp_path / "home")) == 1

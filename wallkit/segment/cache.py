@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import hashlib
 import os
-import sys
 import threading
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from wallkit.core.folders import cache_folder
 from wallkit.core.segmentation import Segmentation
 from wallkit.core.types import CameraImage
 from wallkit.segment.onnx_segmenter import OnnxSegmenter
@@ -95,20 +95,8 @@ def cache_of(segmenter: OnnxSegmenter, folder: str) -> SegmentationCache | None:
     settings = segmenter.settings
     depends = (model, segmenter.layout, segmenter.size, segmenter.names, segmenter.preparation,
                settings.min_score, settings.max_overlap, _engine())  # fmt: skip
-    place = users_folder() if folder == USERS else Path(folder)
+    place = cache_folder("segmentations") if folder == USERS else Path(folder)
     return SegmentationCache(place, _digest([repr(depends).encode()]), segmenter.names, segmenter.roles)
-
-
-def users_folder() -> Path:
-    """Where programs keep what they can make again, for this user on this system."""
-    home = Path.home()
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
-    elif sys.platform == "darwin":
-        base = home / "Library" / "Caches"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache")
-    return base / "wallkit" / "segmentations"
 
 
 def _engine() -> str:

@@ -1,11 +1,16 @@
-"""Words of a manifest -> files: globs and folders are searched, short names told apart, contents hashed once."""
+"""Words of a manifest -> files: globs and folders are searched, short names told apart, contents hashed once.
+
+A file is an absolute path, or an address as batch.remote knows them.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, MutableMapping, Sequence
-from pathlib import Path
+from pathlib import Path, PurePath, PurePosixPath
+from urllib.request import url2pathname
 
 from wallkit.errors import ConfigError
+from wallkit.pipelines.batch import remote
 from wallkit.pipelines.run_folder import RESULT_MCAP, sha256
 
 LOGS = (".mcap", ".bag", ".db3", ".clf")
@@ -15,33 +20,60 @@ UNREADABLE = "unreadable"
 Digests = MutableMapping[str, tuple[int, int, str]]
 
 
-def find_logs(words: Sequence[str], folder: Path, *, suffixes: Sequence[str] = LOGS, where: str) -> list[Path]:
+def find_logs(words: Sequence[str], folder: Path, *, suffixes: Sequence[str] = LOGS, where: str) -> list[str]:
     """Every log named, once, in the order of the words and sorted within each.
 
     Raises:
         ConfigError: a word names nothing.
+        WallkitError: an address cannot be looked at.
     """
-    found: dict[Path, None] = {}
+    found: dict[str, None] = {}
     for word in words:
-        here = dict.fromkeys(_named(word, folder, suffixes))
+        is_address = remote.is_address(word)
+        named = remote.logs_at(word, suffixes) if is_address else map(str, _named(word, folder, suffixes))
+        here = dict.fromkeys(named)
         if not here:
-            what = "matches nothing" if _is_glob(word) else "names no log"
-            hint = f"looked from {folder}; a folder is searched for {', '.join(suffixes)}"
+            is_glob = remote.is_glob(word) if is_address else _is_glob(word)
+            what = "matches nothing" if is_glob else "names no log"
+            looked = "" if is_address else f"looked from {folder}; "
+            hint = f"{looked}a folder is searched for {', '.join(suffixes)}"
             raise ConfigError(f"'{word}' {what}", where=where, hint=hint)
         found.update(here)
     return list(found)
 
 
-def named_by(word: str, log: Path, folder: Path) -> Path:
+def named_by(word: str, log: str, folder: Path) -> str:
     """A file from the manifest's folder; `beside:NAME` from the log's."""
-    if word.startswith(BESIDE):
-        return (log if log.is_dir() else log.parent) / word.removeprefix(BESIDE)
-    return folder / Path(word).expanduser()
+    if remote.is_address(word):
+        return word
+    if not word.startswith(BESIDE):
+        return str(folder / path_of(word))
+    name = word.removeprefix(BESIDE)
+    if remote.is_address(log):
+        return remote.beside(log, name)
+    return str((Path(log) if Path(log).is_dir() else Path(log).parent) / name)
 
 
-def short_names(paths: Sequence[Path]) -> list[str]:
+def path_of(word: str) -> Path:
+    """A word that is no address as a path."""
+    return Path(url2pathname(word.removeprefix("file://")) if word.startswith("file://") else word).expanduser()
+
+
+def is_there(word: str, folder: Path) -> bool:
+    """Whether a word names a file or folder.
+
+    Raises:
+        WallkitError: an address cannot be looked at.
+    """
+    return remote.is_there(word) if remote.is_address(word) else (folder / path_of(word)).exists()
+
+
+def short_names(files: Sequence[str]) -> list[str]:
     """A name for each that tells them apart, as short as can be: of the file, of its folder, of both, or all of it."""
-    ways: tuple[Callable[[Path], str], ...] = (
+    paths = [
+        PurePosixPath("/", remote.bare(f).replace("://", "/")) if remote.is_address(f) else PurePath(f) for f in files
+    ]
+    ways: tuple[Callable[[PurePath], str], ...] = (
         lambda p: p.name.partition(".")[0],
         lambda p: p.parent.name,
         lambda p: f"{p.parent.name}-{p.name.partition('.')[0]}",
@@ -73,7 +105,7 @@ def digest(path: Path, known: Digests) -> str:
 
 
 def _named(word: str, folder: Path, suffixes: Sequence[str]) -> Iterator[Path]:
-    path = Path(word).expanduser()
+    path = path_of(word)
     if _is_glob(word):
         root, pattern = (
             (Path(path.anchor), str(path.relative_to(path.anchor))) if path.is_absolute() else (folder, word)

@@ -10,6 +10,7 @@ from typing import Any
 from wallkit.batch.rows import Measure
 from wallkit.core.config import Source, build, read_toml
 from wallkit.core.types import Health
+from wallkit.pipelines.batch.files import path_of
 from wallkit.pipelines.batch.labels import labels_of_runs
 from wallkit.pipelines.batch.plan import Task
 from wallkit.pipelines.cameras import CameraRequest
@@ -175,7 +176,7 @@ def _prepared(task: Task, config: Config) -> Prepared:
 
 def _beside(task: Task, words: str) -> str:
     """A file that the manifest names, else the words."""
-    path = Path(task.home) / words
+    path = Path(task.home) / path_of(words)
     return str(path) if words and path.is_file() else words
 
 

@@ -22,7 +22,8 @@ class Manifest:
 
     job: Job = setting("localize", "what is done: localize (and evaluate), calib verify, map audit or simulate")
     logs: tuple[str, ...] = setting(
-        (), "files, globs (`**` too) and folders; a folder is a bag, else all logs below it; of `simulate` scenarios"
+        (),
+        "files, globs (`**` too), folders, `s3://...`; a folder is a bag, else all logs below it; of `simulate` scenarios",
     )
     maps: tuple[str, ...] = setting((), "one, or alternatives; none: the log's own, or that of the settings")
     calibrations: tuple[str, ...] = setting((), "one, or alternatives; 'front.toml+rear.toml' is two cameras at once")
@@ -36,6 +37,9 @@ class Manifest:
     lidar_sigma: str = setting("", "of `calib verify`: noise of a range, as `--lidar-sigma`")
     robot: str = setting("", "of `simulate`: a URDF; empty: one with a LiDAR")
     seeds: tuple[int, ...] = setting((0,), "seeds of every run", low=0)
+    cache: str = setting(
+        "", "folder for copies of inputs at addresses, on each machine; empty: the user's cache folder"
+    )
     config: str = setting("", "a wallkit.toml below all configurations; empty: the defaults, whatever the folder holds")
 
 

@@ -17,6 +17,8 @@ from wallkit.evaluate.convergence import is_lost
 from wallkit.evaluate.metrics import errors_from_pairs
 from wallkit.evaluate.tum import read_tum
 from wallkit.maps.grids.fields import MapsSettings
+from wallkit.pipelines.batch.copies import fetched, seen
+from wallkit.pipelines.batch.remote import is_address, name_of
 from wallkit.pipelines.batch.runs import Runs
 from wallkit.pipelines.evaluate import EvaluateSettings
 from wallkit.pipelines.maps import load_map
@@ -43,10 +45,10 @@ def read_places(
         except WallkitError:
             unread[log] = unread.get(log, 0) + 1
             continue
-        key, path, at, errors, lost = found
+        key, name, at, errors, lost = found
         ground = grounds.get(key)
         if ground is None:
-            ground = grounds[key] = _Ground.of(path, at)
+            ground = grounds[key] = _Ground.of(name, at)
         of_log[log] = ground
         ground.logs.add(log)
         ground.add(at, errors, lost)
@@ -58,15 +60,20 @@ def read_places(
 
 def _read(
     folder: Path, truths: _Truths, settings: EvaluateSettings
-) -> tuple[str, Path, Float64Array, Float64Array, Float64Array]:
-    """Key and path of the map, true places (E, 2), error [m] (E,) and whether it was lost (E,)."""
+) -> tuple[str, str, Float64Array, Float64Array, Float64Array]:
+    """Key and file of the map, true places (E, 2), error [m] (E,) and whether it was lost (E,)."""
     run = read_json(folder / "run.json")
     estimate, truth = read_tum(folder / "estimate.tum"), truths.read(folder / "truth.tum")
     gap, offset = round(settings.truth_gap_s * 1e9), round(settings.truth_offset_s * 1e9)
     pairs = interpolate_truth(estimate, truth, tolerance_ns=gap, offset_ns=offset)
     errors = errors_from_pairs(pairs)
-    path = Path(str(run.get("map", "")))
-    return _map_key(run), path, pairs.truth[:, :2], errors.position_m, is_lost(errors, settings.limits).astype(float)
+    return (
+        _map_key(run),
+        str(run.get("map", "")),
+        pairs.truth[:, :2],
+        errors.position_m,
+        is_lost(errors, settings.limits).astype(float),
+    )
 
 
 def _map_key(run: dict[str, Any]) -> str:
@@ -105,14 +112,19 @@ class _Ground:
     logs: set[int] = field(default_factory=set)
 
     @classmethod
-    def of(cls, path: Path, at: Float64Array) -> _Ground:
-        grid = _grid(path)
+    def of(cls, file: str, at: Float64Array) -> _Ground:
+        grid = _grid(file)
         if grid is None:
             corners = at
         else:
             height, width = grid.cells.shape
             corners = np.array([[0.0, 0.0], [width * grid.resolution_m, height * grid.resolution_m]])
-        name = path.name.removesuffix(".urdf").removesuffix(".wkmap").removesuffix(".yaml")
+        name = (
+            (name_of(file) if is_address(file) else Path(file).name)
+            .removesuffix(".urdf")
+            .removesuffix(".wkmap")
+            .removesuffix(".yaml")
+        )
         return cls(name, grid, cell_size(corners))
 
     def add(self, at: Float64Array, errors: Float64Array, lost: Float64Array) -> None:
@@ -149,11 +161,10 @@ class _Ground:
         self.rows, self.count = [np.column_stack([cells, *sums])], len(cells)
 
 
-def _grid(path: Path) -> OccupancyGrid | None:
+def _grid(file: str) -> OccupancyGrid | None:
     """The walls, where the map is still there and can be read."""
-    if not path.is_file():
-        return None
     try:
-        return load_map(path, None, MapsSettings()).grid
+        path = fetched(seen(file, is_map=True, known={}), "") if is_address(file) else Path(file)
+        return load_map(path, None, MapsSettings()).grid if path.is_file() else None
     except WallkitError:
         return None

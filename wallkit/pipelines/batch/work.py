@@ -21,6 +21,7 @@ from pathlib import Path
 import wallkit
 from wallkit.batch.rows import Outcome
 from wallkit.errors import WallkitError
+from wallkit.pipelines.batch.here import Here, here
 from wallkit.pipelines.batch.jobs import JOBS, Came
 from wallkit.pipelines.batch.plan import Task
 from wallkit.pipelines.outputs import put_in_place
@@ -100,16 +101,21 @@ def _do(task: Task, version: str) -> Outcome:
 
 def _try(task: Task, working: Path) -> Came | str:
     """What came of it, or why nothing did."""
+    run = Here(task, {})
     try:
         working.parent.mkdir(parents=True, exist_ok=True)
         shutil.rmtree(working, ignore_errors=True)
-        came = JOBS[task.manifest.job](task, working)
+        run = here(task)
+        came = JOBS[task.manifest.job](run.task, working)
+        if run.copies:
+            for path in working.glob("*.json"):
+                path.write_text(run.as_written(path.read_text(encoding="utf-8")), encoding="utf-8")
     except WallkitError as error:
-        return str(error)
+        return run.as_written(str(error))
     except OSError as error:
-        return f"{error.filename or task.log}: {error.strerror or error}"
+        return run.as_written(f"{error.filename or task.log}: {error.strerror or error}")
     except Exception:  # noqa: BLE001  a bug in one run must not take the others with it
         return f"a bug in wallkit, please report it:\n{traceback.format_exc()}"
     numbers = {key: value if value is None else float(value) for key, value in came.metrics.items()}
     finite = {key: value if value is None or abs(value) < float("inf") else None for key, value in numbers.items()}
-    return replace(came, metrics=finite)
+    return replace(came, message=run.as_written(came.message), metrics=finite)
