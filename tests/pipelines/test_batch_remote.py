@@ -102,6 +102,8 @@ def test_beside_is_the_folder_of_the_log_whatever_follows_it():
     assert named_by("beside:../map.yaml", "s3://b/x/log.mcap", Path("/")) == "s3://b/map.yaml"
     assert beside("https://h/x/log.mcap?sig=a/b", "map.yaml") == "https://h/x/map.yaml?sig=a/b"
     assert beside("zip://x/log.mcap::s3://b/a.zip", "map.yaml") == "zip://x/map.yaml::s3://b/a.zip"
+    assert short_names([f"zip://{name}.mcap::s3://b/a.zip" for name in "xy"]) == ["x", "y"]
+    assert short_names([f"https://h/{name}/log.mcap?sig=a/{name}" for name in "xy"]) == ["x", "y"]
     assert beside("simplecache::s3://b/x/log.mcap", "map.yaml") == "simplecache::s3://b/x/map.yaml"
     assert not any(map(is_address, ("a/b.mcap", "C:\\logs", "C:/logs", "beside:map.yaml", "file:///x")))
 

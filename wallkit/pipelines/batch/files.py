@@ -70,9 +70,7 @@ def is_there(word: str, folder: Path) -> bool:
 
 def short_names(files: Sequence[str]) -> list[str]:
     """A name for each that tells them apart, as short as can be: of the file, of its folder, of both, or all of it."""
-    paths = [
-        PurePosixPath("/", remote.bare(f).replace("://", "/")) if remote.is_address(f) else PurePath(f) for f in files
-    ]
+    paths = [PurePosixPath("/", remote.path_in(f)) if remote.is_address(f) else PurePath(f) for f in files]
     ways: tuple[Callable[[PurePath], str], ...] = (
         lambda p: p.name.partition(".")[0],
         lambda p: p.parent.name,

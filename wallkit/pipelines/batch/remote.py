@@ -37,6 +37,7 @@ _TAGS = (
 # when it was changed; `time` of SFTP is when it was read
 _TIMES = ("lastmodified", "last_modified", "last-modified", "mtime", "modified", "modify", "updated", "modificationtime",
           "last_write_time", "date_time", "created")  # fmt: skip
+_AGAIN = "failed runs are done again with `--retry`"
 _REFUSED = (401, 403, 407)
 _OF_THIS_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 _GUIDE = "docs/how-to/run-on-a-cluster.md says where credentials are looked for"
@@ -54,9 +55,14 @@ def beside(url: str, name: str) -> str:
     return f"{scheme}://{_joined(posixpath.dirname(path), name)}{tail}"
 
 
+def path_in(url: str) -> str:
+    """Where it lies, from its bucket, host or archive on."""
+    return _cut(url)[0].rpartition("://")[2]
+
+
 def name_of(url: str) -> str:
     """The name of a file or folder."""
-    return _cut(url)[0].rstrip("/").rpartition("/")[2]
+    return path_in(url).rstrip("/").rpartition("/")[2]
 
 
 def bare(url: str) -> str:
@@ -182,8 +188,10 @@ def _sentence(url: str, error: Exception) -> WallkitError:
     if is_refused or re.search("Credential|Authenti", type(error).__name__):
         return WallkitError(f"access is refused: {said}", where=url, hint=_GUIDE)
     if isinstance(error, FileNotFoundError) or status == 404:
-        return WallkitError("is not there", where=url, hint="was it moved or deleted? `--retry` tries it again")
-    return WallkitError(f"cannot be read: {type(error).__name__}: {said}", where=url, hint="`--retry` tries it again")
+        return WallkitError("is not there", where=url, hint="was it moved or deleted? " + _AGAIN)
+    return WallkitError(
+        f"cannot be read: {type(error).__name__}: {said}", where=url, hint="does this machine reach it? " + _AGAIN
+    )
 
 
 def _how_to_install(url: str) -> str:
