@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import csv
+import errno
 import importlib
 import io
 import pickle
 import re
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -189,6 +191,32 @@ def test_the_same_batch_from_addresses_and_what_vanishes_or_changes_fails_alone(
     put_sample(memory, "/fleet/c")
     assert ran(tmp_path, text, "there", before=lambda: memory.rm("/fleet/a/log.mcap")) == here
     assert not list((tmp_path / "cache").glob("*.partial-*"))
+
+
+def test_it_is_fetched_once_and_a_full_disk_is_told_as_one(memory, tmp_path, monkeypatch):
+    memory.pipe("/log.mcap", b"log")
+    copied = seen("memory://log.mcap", is_map=False, known={})
+    got, get = [], type(memory).get_file
+
+    def slowly(self, path, to):
+        got.append(to)
+        threading.Event().wait(0.05)
+        get(self, path, to)
+
+    monkeypatch.setattr(type(memory), "get_file", slowly)
+    with ThreadPoolExecutor(4) as pool:
+        paths = set(pool.map(lambda _: fetched(copied, str(tmp_path / "c")), range(4)))
+    assert (len(got), {path.read_bytes() for path in paths}) == (1, {b"log"})
+
+    def full(self, path, to):
+        Path(to).write_bytes(b"l")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(type(memory), "get_file", full)
+    with pytest.raises(WallkitError, match=r"memory://log\.mcap cannot be written: No space left") as caught:
+        fetched(copied, str(tmp_path / "full"))
+    assert caught.value.where == str(tmp_path / "full")
+    assert [path.name for path in (tmp_path / "full").iterdir()] == [".locks"]
 
 
 def test_a_bad_log_is_named_by_its_address(memory, tmp_path):
