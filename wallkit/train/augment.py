@@ -11,15 +11,22 @@ from typing import Any
 
 import numpy as np
 
-from wallkit.core.types import Float32Array, UInt8Array
+from wallkit.core.types import Float32Array, Float64Array, UInt8Array
 from wallkit.train.pictures import GREY, UNLABELLED
 
 
 @dataclass(frozen=True)
 class Changes:
-    """How far pictures are changed; shares are probabilities, (from, to) ranges."""
+    """How far pictures are changed; shares are probabilities, (from, to) ranges.
+
+    Attributes:
+        close, closer: how often a picture is looked at from so much nearer, at something of a class that is drawn evenly:
+            robots meet people who fill the picture, rooms drawn at random hardly do.
+    """
 
     zoom: tuple[float, float] = (0.75, 1.8)
+    close: float = 0.15
+    closer: tuple[float, float] = (1.8, 3.2)
     stretch: float = 0.12
     turn_deg: float = 4.0
     repainted: float = 0.6
@@ -68,7 +75,8 @@ def _moved(
     import cv2
 
     height, width = classes.shape
-    zoom = float(np.exp(rng.uniform(*np.log(changes.zoom)))) * size[0] / width
+    close = rng.random() < changes.close
+    zoom = float(np.exp(rng.uniform(*np.log(changes.closer if close else changes.zoom)))) * size[0] / width
     stretch = float(np.exp(rng.normal(0, changes.stretch) / 2))
     turn = np.deg2rad(rng.normal(0, changes.turn_deg))
     flip = -1.0 if rng.random() < 0.5 else 1.0
@@ -77,6 +85,8 @@ def _moved(
     # the middle of what is seen stays within the picture, the more freely the closer it is looked at
     slack = np.maximum(1 - np.array(size) / (zoom * np.array([width, height])), 0.1)
     middle = np.array([width, height]) * (0.5 + 0.5 * slack * rng.uniform(-1, 1, 2))
+    if close:
+        middle = _somewhere(rng, classes, middle)
     M = np.column_stack([A, np.array(size) / 2 - A @ middle])
     way = cv2.INTER_AREA if zoom < 0.6 else cv2.INTER_LINEAR
     moved = cv2.warpAffine(image, M, size, flags=way, borderMode=cv2.BORDER_CONSTANT, borderValue=(GREY,) * 3)
@@ -84,6 +94,17 @@ def _moved(
         classes, M, size, flags=cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT, borderValue=UNLABELLED
     )
     return np.asarray(moved, dtype=np.uint8), np.asarray(labels, dtype=np.uint8)
+
+
+def _somewhere(rng: np.random.Generator, classes: UInt8Array, middle: Float64Array) -> Float64Array:
+    """x, y of a pixel of one of the classes that are there; the middle where nothing is labelled."""
+    there = np.unique(classes[::4, ::4])
+    there = there[there != UNLABELLED]
+    if not there.size:
+        return middle
+    rows, columns = np.nonzero(classes[::4, ::4] == rng.choice(there))
+    at = int(rng.integers(len(rows)))
+    return 4.0 * np.array([columns[at], rows[at]])
 
 
 def _repainted(rng: np.random.Generator, light: Float32Array, classes: UInt8Array, strength: float) -> Float32Array:
