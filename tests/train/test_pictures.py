@@ -9,7 +9,7 @@ from tests.train.flat import flat
 from wallkit.train.augment import Changes, changed
 from wallkit.train.pictures import GREY, UNLABELLED, class_weights, letterboxed, pixel_counts, showing_odds, stacked
 
-STILL = Changes(repainted=0, shaded=0, blurred=0, noisy=0, squeezed=0, cluttered=0)
+STILL = Changes(close=0, repainted=0, shaded=0, blurred=0, noisy=0, squeezed=0, cluttered=0)
 
 
 def test_a_letterbox_keeps_the_shape_and_says_nothing_of_its_bars():
@@ -95,3 +95,15 @@ def test_clutter_is_labelled_as_other_and_stays_off_the_unlabelled():
         seen += int((labels == 9).sum())
         np.testing.assert_array_equal(labels == UNLABELLED, plain[1] == UNLABELLED)
     assert seen > 500
+
+
+def test_a_closer_look_is_at_something_of_a_class_drawn_evenly():
+    """A person of half a percent of the picture is looked at as often as the wall: in half of the looks."""
+    image, numbers = flat(np.random.default_rng(0), (320, 240))
+    numbers[:] = 0
+    numbers[100:124, 140:156] = 1
+    near = Changes(**{**vars(STILL), "close": 1.0, "stretch": 0, "turn_deg": 0})
+    looks = [changed(np.random.default_rng(seed), image, numbers, (320, 240), near)[1] for seed in range(60)]
+    at_the_person = sum(int(labels[118:122, 158:162].max() == 1) for labels in looks)
+    assert 18 <= at_the_person <= 42
+    assert max((labels == 1).mean() for labels in looks) > 4 * (numbers == 1).mean()
