@@ -23,9 +23,9 @@ def test_it_is_a_small_file_under_the_projects_licence():
     metadata = load_segmenter(DEFAULT).model.metadata
     assert metadata["license"] == "Apache-2.0"
     assert metadata["task"] == "semantic"
-    # made of simulated pictures that a manifest names, and of nothing else
+    # made of simulated pictures that two manifests name, and of nothing else
     assert "simulated" in metadata["description"]
-    assert [len(digest) for digest in ast.literal_eval(metadata["datasets"])] == [64]
+    assert [len(digest) for digest in ast.literal_eval(metadata["datasets"])] == [64, 64]
 
 
 def test_its_classes_are_those_of_the_usual_training_sets_and_all_have_a_role():
