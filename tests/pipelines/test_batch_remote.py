@@ -8,6 +8,7 @@ import importlib
 import io
 import pickle
 import re
+import sqlite3
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
@@ -162,6 +163,10 @@ def test_what_goes_wrong_is_one_sentence_about_the_address(memory, monkeypatch):
         assert re.search(hint, caught.value.hint)
 
 
+def _no_lock(*words, **options):
+    raise sqlite3.OperationalError("locking protocol")
+
+
 def _refuse(self, path):
     raise PermissionError("no")
 
@@ -207,6 +212,12 @@ def test_it_is_fetched_once_and_a_full_disk_is_told_as_one(memory, tmp_path, mon
     with ThreadPoolExecutor(4) as pool:
         paths = set(pool.map(lambda _: fetched(copied, str(tmp_path / "c")), range(4)))
     assert (len(got), {path.read_bytes() for path in paths}) == (1, {b"log"})
+    # where nothing can be locked, all of them fetch it, and one copy stays
+    monkeypatch.setattr("wallkit.pipelines.batch.copies.sqlite3.connect", _no_lock)
+    with ThreadPoolExecutor(4) as pool:
+        paths = set(pool.map(lambda _: fetched(copied, str(tmp_path / "d")), range(4)))
+    assert (len(paths), {path.read_bytes() for path in paths}) == (1, {b"log"})
+    assert sorted(path.name for path in (tmp_path / "d").iterdir()) == [".locks", copied.content]
 
     def full(self, path, to):
         Path(to).write_bytes(b"l")
@@ -239,7 +250,7 @@ def test_the_same_batch_by_http(tmp_path):
         assert ran(tmp_path, MANIFEST.format(root=root), "there") == here
         server.shutdown()
     with pytest.raises(WallkitError, match="cannot be read: ClientConnector"):
-        find_logs([f"{root}/a/log.mcap"], tmp_path, where="")
+        seen(f"{root}/a/log.mcap", is_map=False, known={})
 
 
 class _Quiet(SimpleHTTPRequestHandler):

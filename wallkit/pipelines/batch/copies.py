@@ -7,8 +7,9 @@ import os
 import re
 import shutil
 import sqlite3
+import threading
 from collections.abc import Iterator, MutableMapping
-from contextlib import closing, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
@@ -45,6 +46,9 @@ def seen(url: str, *, is_map: bool, known: MutableMapping[str, tuple[int, int, s
     Args:
         is_map: files that it names are part of it.
         known: names in maps, remembered; added to.
+
+    Raises:
+        WallkitError: nobody answers.
     """
     try:
         names = remote.files_below(url) if url.endswith("/") else [remote.name_of(url)]
@@ -56,7 +60,7 @@ def seen(url: str, *, is_map: bool, known: MutableMapping[str, tuple[int, int, s
             beside = [(name, remote.mark_of(remote.beside(url, name))) for name in known[key][2].splitlines()]
             # the map's reader says what is missing
             marks += [(name, mark) for name, mark in beside if mark]
-    except WallkitError:
+    except remote.UnseenError:
         marks = [(remote.name_of(url), "")]
     return Copied(url, tuple(marks))
 
@@ -81,9 +85,9 @@ def fetched(copied: Copied, folder: str) -> Path:
     place = cache / copied.content
     if not place.is_dir():
         try:
-            with _alone(cache, copied.content):
+            with _alone(cache, copied.content) as is_alone:
                 if not place.is_dir():
-                    _fill(place, copied)
+                    _fill(place, copied, is_alone=is_alone)
         except OSError as error:
             message = f"the copy of {copied.url} cannot be written: {error.strerror or error}"
             raise OutputError(
@@ -92,10 +96,11 @@ def fetched(copied: Copied, folder: str) -> Path:
     return place / remote.name_of(copied.url)
 
 
-def _fill(place: Path, copied: Copied) -> None:
-    for left in place.parent.glob(f".{place.name}.partial-*"):
+def _fill(place: Path, copied: Copied, *, is_alone: bool) -> None:
+    # of processes that died
+    for left in place.parent.glob(f".{place.name}.partial-*") if is_alone else ():
         shutil.rmtree(left, ignore_errors=True)
-    working = place.with_name(f".{place.name}.partial-{os.getpid()}")
+    working = place.with_name(f".{place.name}.partial-{os.getpid()}-{threading.get_ident()}")
     is_folder = copied.url.endswith("/")
     root = working / remote.name_of(copied.url) if is_folder else working
     try:
@@ -107,8 +112,12 @@ def _fill(place: Path, copied: Copied) -> None:
             if remote.mark_of(url, is_fresh=True) != mark:
                 hint = "the same command plans it anew; finished runs of other logs stay"
                 raise WallkitError("has changed since the batch was planned", where=url, hint=hint)
-        with suppress(FileExistsError):
+        try:
             working.rename(place)
+        except OSError:
+            # another one was faster
+            if not place.is_dir():
+                raise
     finally:
         shutil.rmtree(working, ignore_errors=True)
 
@@ -118,12 +127,18 @@ def _address(url: str, name: str) -> str:
 
 
 @contextmanager
-def _alone(cache: Path, content: str) -> Iterator[None]:
-    """One process of this machine at a time; the lock goes with the process that holds it."""
+def _alone(cache: Path, content: str) -> Iterator[bool]:
+    """One process of this machine at a time; the lock goes with the process that holds it.
+
+    Yields whether there is a lock: where files cannot be locked it may be fetched twice, and the first copy stays.
+    """
     locks = cache / ".locks"
     locks.mkdir(parents=True, exist_ok=True)
-    with closing(sqlite3.connect(locks / content[:2], timeout=_WAIT_S, isolation_level=None)) as lock:
-        # where files cannot be locked it is fetched twice, and the first copy stays
+    with ExitStack() as held:
+        is_alone = False
         with suppress(sqlite3.Error):
+            lock = sqlite3.connect(locks / content[:2], timeout=_WAIT_S, isolation_level=None)
+            held.enter_context(closing(lock))
             lock.execute("BEGIN EXCLUSIVE")
-        yield
+            is_alone = True
+        yield is_alone

@@ -21,19 +21,8 @@ _ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+(://|::.*://)")
 _MAGIC = re.compile(r"[*?[]")
 _MAGIC_OF_HTTP = re.compile(r"[*[]")
 # what says that a content is the same: of S3, Google, Azure, HTTP, OCI, Dropbox, Hugging Face, git, GitHub and zip
-_TAGS = (
-    "etag",
-    "e_tag",
-    "md5hash",
-    "content_md5",
-    "content-md5",
-    "content_hash",
-    "blob_id",
-    "hex",
-    "sha",
-    "digest",
-    "crc",
-)
+_TAGS = ("etag", "e_tag", "md5hash", "content_md5", "content-md5", "content_hash", "blob_id", "hex", "sha", "digest",
+         "crc")  # fmt: skip
 # when it was changed; `time` of SFTP is when it was read
 _TIMES = ("lastmodified", "last_modified", "last-modified", "mtime", "modified", "modify", "updated", "modificationtime",
           "last_write_time", "date_time", "created")  # fmt: skip
@@ -41,6 +30,10 @@ _AGAIN = "failed runs are done again with `--retry`"
 _REFUSED = (401, 403, 407)
 _OF_THIS_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 _GUIDE = "docs/how-to/run-on-a-cluster.md says where credentials are looked for"
+
+
+class UnseenError(WallkitError):
+    """A file that is not there or that nobody shows us; others of the same place may be."""
 
 
 def is_address(word: str) -> bool:
@@ -186,10 +179,11 @@ def _sentence(url: str, error: Exception) -> WallkitError:
         )
     is_refused = isinstance(error, PermissionError) or status in _REFUSED
     if is_refused or re.search("Credential|Authenti", type(error).__name__):
-        return WallkitError(f"access is refused: {said}", where=url, hint=_GUIDE)
+        return UnseenError(f"access is refused: {said}", where=url, hint=_GUIDE)
     if isinstance(error, FileNotFoundError) or status == 404:
-        return WallkitError("is not there", where=url, hint="was it moved or deleted? " + _AGAIN)
-    return WallkitError(
+        return UnseenError("is not there", where=url, hint="was it moved or deleted? " + _AGAIN)
+    kind = UnseenError if status is not None else WallkitError
+    return kind(
         f"cannot be read: {type(error).__name__}: {said}", where=url, hint="does this machine reach it? " + _AGAIN
     )
 
