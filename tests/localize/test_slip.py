@@ -8,11 +8,12 @@ import pytest
 from tests.localize.test_filter import at, drive, errors
 from tests.localize.worlds import FLAT, fields_of, scan_at
 from tests.movers import tour
+from tests.plan import plan_from_polylines
 from wallkit.core.geometry import compose, wrap_angle
 from wallkit.core.types import Health
 from wallkit.localize.estimate import find_modes
 from wallkit.localize.particles import equally_weighted, normalised
-from wallkit.localize.sensor import ClassConditional
+from wallkit.localize.sensor import ClassConditional, LikelihoodField
 from wallkit.localize.settings import LocalizeSettings
 from wallkit.localize.slip import SlipSettings, look_around
 
@@ -53,9 +54,36 @@ def test_a_late_stamp_costs_two_updates_of_trust_and_no_error(slip):
 def test_without_the_look_the_same_slip_is_an_error_that_is_noticed():
     poses = tour(ROUND)
     odometry, k = poses.copy(), len(poses) // 2
-    odometry[k] = compose(poses[k], np.array([0.9, 0.0, 0.0]))
+    odometry[k] = compose(poses[k], np.array([1.05, 0.0, 0.0]))
     settings = LocalizeSettings(slip=SlipSettings(reach_m=0.0))
     estimates, _, _, _ = drive(settings, FLAT, poses, odometry, start=at(poses[0]))
     position, _ = errors(estimates, poses)
     assert position[k] > 0.1
     assert estimates[k].health is not Health.LOCALIZED
+
+
+def test_people_who_shut_the_robot_in_are_no_slip():
+    """They stand as the walls of the closet next door do: the scan fits there, but here nothing lies behind a wall."""
+    hall = [(0, 2.75), (0, 6), (8, 6), (8, 0), (0, 0), (0, 2.6)]
+    closet = [(0, 2.6), (-0.8, 2.6), (-0.8, 3.4), (0, 3.4)]
+    plan = plan_from_polylines(hall, closet)
+    poses = tour([(6.0, 1.0), (6.0, 5.0), (3.0, 3.0), (0.65, 3.0)])
+    inside = np.array([4.0, 3.0])
+    _, _, localizer, belief = drive(
+        LocalizeSettings(sensor=LikelihoodField(sigma_m=0.05)),
+        plan,
+        poses,
+        poses,
+        start=at(poses[0]),
+        fields=fields_of(plan, inside=inside),
+    )
+    here = belief.estimate(0).pose
+    assert np.hypot(*(here - poses[-1])[:2]) < 0.05
+    rng = np.random.default_rng(3)
+    moved = compose(poses[-1], np.array([0.0, 0.0, np.deg2rad(12)]))
+    shut_in = scan_at(plan, moved - np.array([1.05, 0.0, 0.0]), rng=rng)
+    belief = localizer.predict(rng, belief, moved)
+    belief, info = localizer.update(rng, belief, shut_in)
+    assert info.is_update
+    assert info.evidence.short > 0.5
+    assert np.hypot(*(belief.estimate(1).pose - moved)[:2]) < 0.3
