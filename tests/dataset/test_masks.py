@@ -51,6 +51,16 @@ def test_label_lines_fill_to_the_mask_they_came_from(seed):
     assert shares.max() < 1
 
 
+@pytest.mark.parametrize(("rows", "columns"), [((40, 90), (60, 61)), ((70, 71), (10, 120))])
+def test_a_line_one_pixel_thin_is_a_polygon_of_three_points(rows, columns):
+    """Ultralytics takes a row of two points for a box, and then drops the picture: its labels mix both."""
+    mask = np.zeros(SHAPE, dtype=bool)
+    mask[slice(*rows), slice(*columns)] = True
+    (polygon,) = polygons_from_mask(mask)
+    assert len(polygon) == 3
+    assert np.array_equal(mask_from_polygons([polygon], SHAPE), mask)
+
+
 def test_a_ring_is_one_polygon_with_its_hole_open():
     mask = np.zeros(SHAPE, dtype=bool)
     mask[50:150, 60:200] = True

@@ -11,8 +11,8 @@ from wallkit.core.calibration import Calibration
 from wallkit.core.camera import Camera
 from wallkit.core.geometry import compose, invert_matrix, relative, transform_points
 from wallkit.core.types import BeamLabels, CameraImage, Frame, Points, View
-from wallkit.points.labels import labelled_scan
-from wallkit.points.look import LookSettings, _share_out, look, project_frame
+from wallkit.points.labels import PASSED_OVER, labelled_scan, labels_by_beam, thinned
+from wallkit.points.look import Look, LookSettings, _share_out, look, project_frame
 from wallkit.points.outlines import classes_by_outlines
 from wallkit.points.project import hidden, project
 from wallkit.segment.class_map import class_map
@@ -202,6 +202,37 @@ def test_shares_are_those_of_a_loop_over_classes(samples):
     expected = (of_best * sure).sum(axis=0) / np.where(some, of_best.sum(axis=0), 1)
     np.testing.assert_allclose(confidences[seen][some], expected[some], atol=1e-6)
     assert not shares[np.setdiff1d(np.arange(500), seen)].any()
+
+
+def test_a_thinned_scan_is_spread_over_the_sweep_and_says_what_it_left_out():
+    frame = frame_of(np.column_stack([np.arange(1, 1001), np.zeros((1000, 2))]), offsets_s=np.arange(1000) * 1e-4)
+    few = thinned(frame, 240).points
+    assert len(few.ranges_m) == 240
+    assert few.dropped == {PASSED_OVER: 760}
+    assert set(np.diff(few.beams)) == {4, 5}
+    for name in ("xyz_m", "ranges_m", "offsets_s"):
+        np.testing.assert_array_equal(getattr(few, name), getattr(frame.points, name)[few.beams])
+    for enough in (0, 1000, 5000):
+        assert thinned(frame, enough) is frame
+
+
+def test_of_two_cameras_the_one_that_knows_better_counts():
+    frame = frame_of(np.ones((4, 3)))
+    frame = replace(frame, points=replace(frame.points, beams=np.array([1, 2, 4, 5])))
+
+    def says(labels, margins):
+        labels = np.array(labels)
+        shares = np.eye(3, dtype=np.float32)[labels] * (labels >= 0)[:, None]
+        nowhere = project(CALIBRATION, np.ones((4, 3)))
+        return Look(nowhere, labels >= 0, np.array(margins), labels, np.full(4, 0.5, np.float32), shares)
+
+    for order in (1, -1):
+        looks = [says([0, 0, 0, -1], [1.0, 9, 5, 5]), says([1, 2, -1, -1], [5.0, 2, 1, 1])][::order]
+        merged = labels_by_beam(frame, looks, ("a", "b", "c"))
+        np.testing.assert_array_equal(merged.labels, [-1, 0, 2, -1, 0, -1])
+        np.testing.assert_array_equal(merged.shares[[1, 2, 4]], np.eye(3)[[0, 2, 0]])
+        np.testing.assert_array_equal(merged.confidences, [0, 0.5, 0.5, 0, 0.5, 0])
+    assert labels_by_beam(frame, [], ("a",)) is None
 
 
 def test_labels_go_from_beams_to_returns_also_where_there_are_too_few():

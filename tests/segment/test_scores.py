@@ -1,4 +1,4 @@
-"""Scores between cells: the class and how sure it is are those of a plain bilinear look-up."""
+"""Scores between cells: the class is that of a plain bilinear look-up, and so is how sure each cell is of its own."""
 
 from __future__ import annotations
 
@@ -26,13 +26,14 @@ def test_class_and_confidence_are_bilinear(is_probability):
     with np.errstate(invalid="ignore"):
         inside = ((at >= -0.5) & (at < (499.5, 299.5))).all(axis=1)
     cells = (frame.net_from_image(at[inside]) + 0.5) / 4 - 0.5
-    between = np.stack(
-        [map_coordinates(scores[..., c].astype(float), cells[:, ::-1].T, order=1, mode="nearest") for c in range(4)],
-        axis=1,
-    )
-    shares = between if is_probability else softmax(between, axis=1)
+
+    def bilinear(plane):
+        return map_coordinates(plane.astype(float), cells[:, ::-1].T, order=1, mode="nearest")
+
+    between = np.stack([bilinear(scores[..., c]) for c in range(4)], axis=1)
+    sure = (scores if is_probability else softmax(scores, axis=2)).max(axis=2)
     assert (labels[~inside] == -1).all()
     assert not confidences[~inside].any()
-    np.testing.assert_allclose(confidences[inside], shares.max(axis=1), atol=1e-5)
+    np.testing.assert_allclose(confidences[inside], bilinear(sure), atol=1e-5)
     clear = np.diff(np.sort(between, axis=1)[:, -2:], axis=1)[:, 0] > 1e-5
     np.testing.assert_array_equal(labels[inside][clear], between.argmax(axis=1)[clear])

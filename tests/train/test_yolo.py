@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
 
 from tests.train.flat import flat_set
 from wallkit.errors import ModelError
@@ -22,7 +23,7 @@ STAND_IN = """#!{python}
 import json, os, pathlib, sys
 assert sys.argv[1] == "-c" and "ultralytics" in sys.argv[2]
 asked = json.loads(sys.argv[3])
-assert pathlib.Path(asked["data"]).read_text().startswith("path: /")
+assert "train:" in pathlib.Path(asked["data"]).read_text()
 {body}
 folder = pathlib.Path(asked["folder"]) / "train" / "weights"
 folder.mkdir(parents=True)
@@ -68,6 +69,19 @@ def test_a_training_leaves_a_model_a_checkpoint_and_curves(tmp_path):
     assert record["licence"] == "AGPL-3.0"
 
 
+def test_several_sets_are_one_to_learn_from(tmp_path):
+    """The child is told all of their pictures, train and val apart; the record names each."""
+    sets = tuple(flat_set(tmp_path / name, train=2, val=1) for name in ("rooms", "more"))
+    shown = tmp_path / "data.yaml"
+    python = interpreter(tmp_path, f"import shutil; shutil.copy(asked['data'], {str(shown)!r})")
+    train_yolo_model(YoloRequest(sets, python, "yolov8n-seg.yaml", epochs=2), tmp_path / "out")
+    told = yaml.safe_load(shown.read_text())
+    assert told["train"] == [str(one / "images/train") for one in sets]
+    assert told["val"] == [str(one / "images/val") for one in sets]
+    record = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert [one["folder"] for one in record["datasets"]] == ["rooms", "more"]
+
+
 def test_epochs_add_up_the_losses():
     first, second = epochs_of(RESULTS)
     assert (first.train_loss, first.val_loss) == (4.0, 3.5)
@@ -87,7 +101,7 @@ def test_epochs_add_up_the_losses():
 )
 def test_what_went_wrong_is_said(tmp_path, body, says, hint):
     data = tmp_path / "data.yaml"
-    data.write_text("path: /rooms\n")
+    data.write_text("train: []\n")
     with pytest.raises(ModelError, match=says) as caught:
         train_yolo(interpreter(tmp_path, body), data, tmp_path / "out", YoloLesson())
     assert hint in caught.value.hint
@@ -101,5 +115,3 @@ def test_a_missing_interpreter_is_said_with_the_commands_that_make_one(tmp_path)
         assert "pip install --no-deps ultralytics" in caught.value.hint
     with pytest.raises(ModelError, match="cannot be started"):
         train_yolo(str(tmp_path / "nowhere"), tmp_path, tmp_path, YoloLesson())
-    with pytest.raises(ModelError, match="takes one"):
-        check_yolo(YoloRequest((rooms, rooms), sys.executable, "a.yaml"), tmp_path / "out", overwrite=False)

@@ -91,12 +91,15 @@ def _filled_px(contour: Any) -> float:
 
 
 def _simplified(contour: Any) -> Int64Array:
-    """(P, 2) the contour with fewer points."""
+    """(P, 2) the contour with fewer points, three or more: a line one pixel thin goes there and back.
+
+    Readers of label files take a row of two points for a box, and throw the whole picture away.
+    """
     import cv2
 
     most = min(_MOST_PX, _SHARE * _filled_px(contour) / len(contour))
     fewer = cv2.approxPolyDP(contour, most, closed=True)[:, 0]
-    return np.asarray(fewer, dtype=np.int64)
+    return np.resize(fewer, (max(len(fewer), 3), 2)).astype(np.int64)
 
 
 def _bridged(outline: Int64Array, holes: list[Int64Array]) -> Int64Array:

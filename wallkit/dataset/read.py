@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -69,6 +69,22 @@ def read_training_set(folder: Path) -> TrainingSet:
         )
     digest = hashlib.sha256(manifest.read_bytes()).hexdigest() if manifest.is_file() else ""
     return TrainingSet(folder, _names(folder / "data.yaml"), pairs, digest, str(record.get("kind", "unknown")))
+
+
+def read_training_sets(folders: Sequence[Path]) -> tuple[TrainingSet, ...]:
+    """Several to train on together.
+
+    Raises:
+        DatasetError: one cannot be read, has no pictures for validation, or its classes are not those of the first.
+    """
+    sets = tuple(read_training_set(folder) for folder in folders)
+    for one in sets:
+        if one.names != sets[0].names:
+            said = f"its classes are {', '.join(one.names)}; those of {sets[0].folder} {', '.join(sets[0].names)}"
+            raise DatasetError(said, where=one.folder, hint="make both with the same --classes")
+        for split in ("train", "val"):
+            one.of(split)
+    return sets
 
 
 def read_pair(pair: Pair, classes: int) -> tuple[UInt8Array, UInt8Array]:

@@ -42,7 +42,7 @@ from wallkit.pipelines.sight import Sight, sight_of
 from wallkit.pipelines.start import check_on_map, find_start
 from wallkit.pipelines.watch import Filtering, Moment, Watch
 from wallkit.points.filters import WITH_CAMERA, apply_filters
-from wallkit.points.labels import labelled_scan
+from wallkit.points.labels import labelled_scan, thinned
 from wallkit.report.data import Snapshot
 
 
@@ -197,6 +197,7 @@ def localize(
                 # an image is looked at only for an update: most scans need none
                 if p.sight is not None and tracker.wants(belief, scan):
                     ahead.restart(frame.odometry)
+                    frame = thinned(frame, p.config.points.look.returns)
                     seen = p.sight.labels_of(frame, sights)
                     scan = labelled_scan(replace(frame, labels=seen.labels))
                 scan = apply_filters(filters, scan, belief.estimate())

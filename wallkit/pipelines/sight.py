@@ -26,6 +26,7 @@ from wallkit.pipelines.cameras import (
     too_seldom,
 )
 from wallkit.points.filters import PointsSettings
+from wallkit.points.labels import labels_by_beam
 from wallkit.points.look import ClassesAt, Look, LookSettings, look, project_frame
 from wallkit.points.outlines import classes_by_outlines
 from wallkit.points.perturb import PerturbSettings, perturbed, without_dropped
@@ -146,7 +147,8 @@ class Sight:
             located = project_frame(camera.calibration, frame, view, self.T_lidar_base, self.settings)
             seen = look(located, self._classes_at(segmentation), self._class_of, len(self.classes))
             glances.append(Glance(camera, view, segmentation, seen))
-        found = Labelled(_merged(frame, glances, self.classes), tuple(glances), cost_ms, owed_ms)
+        labels = labels_by_beam(frame, [glance.look for glance in glances], self.classes)
+        found = Labelled(labels, tuple(glances), cost_ms, owed_ms)
         self._check(found)
         if self.holds_scans and len(self._scans) < _SCANS_HELD:
             self._scans[frame.stamp_ns] = Labelled(found.labels, (), cost_ms, cost_ms)
@@ -295,20 +297,3 @@ def _perturbed(camera: Camera, settings: PerturbSettings) -> Camera:
 def _kept(points: PointsSettings) -> tuple[str, ...]:
     """Classes without which a chosen filter would throw everything away."""
     return points.wall_mask.keep if "wall_mask" in points.filters else ()
-
-
-def _merged(frame: Frame, glances: list[Glance], classes: tuple[str, ...]) -> BeamLabels | None:
-    """The labels of all cameras by beam; where two see a return, the one that knows better where it landed counts."""
-    if not glances:
-        return None
-    beams = frame.points.beams
-    count = int(beams.max()) + 1 if len(beams) else 0
-    labels, sure = np.full(count, -1), np.zeros(count, dtype=np.float32)
-    shares, best = np.zeros((count, len(classes)), dtype=np.float32), np.full(count, np.inf)
-    for glance in glances:
-        found = glance.look
-        better = (found.labels >= 0) & (found.margins_px < best[beams])
-        at = beams[better]
-        labels[at], sure[at] = found.labels[better], found.confidences[better]
-        shares[at], best[at] = found.shares[better], found.margins_px[better]
-    return BeamLabels(frame.stamp_ns, labels, classes, sure, shares)

@@ -14,6 +14,7 @@ from wallkit.pipelines.cameras import Camera
 from wallkit.pipelines.sight import Glance, Labelled, Sight
 from wallkit.points.filters import PointsSettings
 from wallkit.points.kept import kept_of
+from wallkit.points.labels import PASSED_OVER
 
 # what a return counts as that no camera labelled
 UNSEEN = "not seen"
@@ -26,7 +27,8 @@ class Filtering:
     Attributes:
         filters, model: by name. cameras: what they are, for run.json.
         updates: of the filter. few, one_sided: those with too few kept returns, or kept returns that hold one direction.
-        returns, kept: over all updates. by_class: class -> (returns, kept).
+        returns, kept: over all updates. passed_over: returns that were not looked up, beside those.
+        by_class: class -> (returns, kept).
         images: looked at for updates. without_image: updates that no image belonged to.
         segment_ms: mean of decoding and segmenting per update; None without a camera.
         notes: what else a reader of the numbers should know, a sentence each.
@@ -40,6 +42,7 @@ class Filtering:
     one_sided: int
     returns: int
     kept: int
+    passed_over: int
     by_class: dict[str, tuple[int, int]]
     images: int
     without_image: int
@@ -58,6 +61,7 @@ class Filtering:
             Value(
                 "kept_share", self.kept * of_returns, "share", "share of the returns that the point filters keep", ""
             ),
+            Value("passed_over", float(self.passed_over), "returns", "returns of updates that were not looked up"),
             Value("few_kept", float(self.few), "updates", "updates with too few kept returns (points.kept.least)"),
             Value("one_sided", float(self.one_sided), "updates", "updates whose kept returns hold one direction only"),
         ]
@@ -79,6 +83,11 @@ class Filtering:
         if self.segment_ms is not None:
             said += f", {self.unseen / max(self.returns, 1):.0%} seen by no camera"
         found = [said]
+        if self.passed_over:
+            share, a_scan = self.passed_over / (self.passed_over + self.returns), self.returns / self.updates
+            found.append(
+                f"{share:.0%} of all returns were passed over: {a_scan:.0f} of a scan are looked up (points.look.returns)"
+            )
         if self.few:
             found.append(f"too few returns were kept at {self.few} of {self.updates} updates")
         if self.one_sided:
@@ -101,7 +110,7 @@ class Filtering:
 
 
 # for the keys and definitions of its values
-NO_FILTERING = Filtering((), "", (), 0, 0, 0, 0, 0, {}, 0, 0, 0.0)
+NO_FILTERING = Filtering((), "", (), 0, 0, 0, 0, 0, 0, {}, 0, 0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,6 +143,7 @@ class Watch:
         self._returns: Counter[str] = Counter()
         self._kept: Counter[str] = Counter()
         self._updates = self._few = self._one_sided = self._images = self._without_image = 0
+        self._passed_over = 0
         self._cost_ms = 0.0
         self._moments: list[Moment] = []
         self._every, self._looked = 1, 0
@@ -144,6 +154,7 @@ class Watch:
         self._updates += 1
         self._few += left.is_few
         self._one_sided += left.is_one_sided
+        self._passed_over += scan.points.dropped.get(PASSED_OVER, 0)
         names = (*scan.classes, UNSEEN)
         labels: Int64Array = np.full(len(scan.weights), -1) if scan.labels is None else scan.labels
         # -1 is the last
@@ -171,6 +182,7 @@ class Watch:
             self._one_sided,
             self._returns.total(),
             self._kept.total(),
+            self._passed_over,
             {name: (n, self._kept[name]) for name, n in self._returns.items() if n},
             self._images,
             self._without_image,

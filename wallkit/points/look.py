@@ -38,6 +38,9 @@ class LookSettings:
     lookup: Literal["pixels", "crossing_number", "winding_number", "even_odd", "mask"] = setting(
         "pixels", "what says the class at a pixel: the model itself, or which of its polygons holds it, and how"
     )
+    returns: int = setting(
+        240, "so many returns of a scan, spread over it, are looked up, and only they count; 0: all", low=0
+    )
     margins: float = setting(1.0, "how far the error of a pixel counts; 0: the pixel itself decides", low=0)
     unknown_error_px: float = setting(3.0, "95 % pixel error where the calibration does not say its own", low=0)
     time_sigma_s: float = setting(0.002, "sigma of the time offset where the calibration does not say its own", low=0)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from wallkit.core.segmentation import Polygon
 from wallkit.core.types import BoolArray, Float32Array, Float64Array, Int64Array
@@ -21,6 +21,8 @@ from wallkit.segment.outlines import polygons_of
 @dataclass(frozen=True, eq=False)
 class ScoreMap:
     """A Segmentation of stuff: between cells the scores are bilinear, the highest one counts.
+
+    How sure a class is, is bilinear too, between how sure each cell is of its own class.
 
     Attributes:
         scores: (h, w, C) float32 over the network's input, at any fraction of its size.
@@ -44,9 +46,10 @@ class ScoreMap:
         labels, confidences = np.empty(len(at), dtype=np.int64), np.empty(len(at), dtype=np.float32)
         (height, width), (gain_u, gain_v), (top, left) = self.shape, self.frame.gains, self.frame.corner
         rows, columns, _ = self.scores.shape
-        cell = self.frame.net[1] / columns, self.frame.net[0] / rows
-        lies = width, height, gain_u, gain_v, float(left), float(top), *cell
-        _sample(at, self.scores, lies, self.is_probability, labels, confidences)
+        per_u, per_v = columns / self.frame.net[1], rows / self.frame.net[0]
+        first = (0.5 * gain_u + left) * per_u - 0.5, (0.5 * gain_v + top) * per_v - 0.5
+        lies = width, height, gain_u * per_u, gain_v * per_v, *first
+        _sample(at, self.scores, *self._winners, lies, labels, confidences)
         return labels, confidences
 
     def labels(self) -> Int64Array:
@@ -60,8 +63,14 @@ class ScoreMap:
     def polygons(self, roles: Collection[str] | None = None) -> list[Polygon]:
         """See Segmentation; the confidences are those of the nearest cells."""
         columns, rows = (np.rint(line).astype(np.int64) for line in self._lines())
-        sure = _shares(self.scores, is_probability=self.is_probability).max(axis=2)
-        return polygons_of(self._labels, sure[np.ix_(rows, columns)], chosen(self.roles, roles))
+        return polygons_of(self._labels, self._winners[1][np.ix_(rows, columns)], chosen(self.roles, roles))
+
+    @cached_property
+    def _winners(self) -> tuple[NDArray[np.int16], Float32Array]:
+        """(h, w) the class of each cell, and how sure it is."""
+        best, sure = (np.empty(self.scores.shape[:2], dtype=kind) for kind in (np.int16, np.float32))
+        _find_winners(self.scores, self.is_probability, best, sure)
+        return best, sure
 
     @cached_property
     def _labels(self) -> Int64Array:
@@ -133,45 +142,58 @@ class IdMap:
         return np.asarray(self.ids[rows, columns])
 
 
-def _shares(scores: Float32Array, *, is_probability: bool) -> Float32Array:
-    """Scores (..., C) as they sum to 1."""
-    if is_probability:
-        return scores
-    grown = np.exp(scores - scores.max(axis=-1, keepdims=True))
-    return np.asarray(grown / grown.sum(axis=-1, keepdims=True), dtype=np.float32)
+@njit(cache=True, nogil=True)
+def _find_winners(scores: Any, is_probability: Any, best: Any, sure: Any) -> None:
+    """Fills best and sure (h, w), once per image: the exponentials are what costs."""
+    rows, columns, classes = scores.shape
+    for i in range(rows):
+        for j in range(columns):
+            winner = 0
+            for c in range(1, classes):
+                if scores[i, j, c] > scores[i, j, winner]:
+                    winner = c
+            best[i, j], sure[i, j] = winner, scores[i, j, winner]
+            if not is_probability:
+                total = np.float32(0.0)
+                for c in range(classes):
+                    total += np.exp(scores[i, j, c] - scores[i, j, winner])
+                sure[i, j] = np.float32(1.0) / total
 
 
 @njit(cache=True, nogil=True)
-def _sample(pixels: Any, scores: Any, lies: Any, is_probability: Any, labels: Any, sure: Any) -> None:
-    """Fills labels and sure (K,) for pixels (K, 2); `lies` says where they are in the grid, as ScoreMap._cells."""
-    width, height, gain_u, gain_v, left_px, top_px, cell_u, cell_v = lies
+def _sample(pixels: Any, scores: Any, best: Any, sure: Any, lies: Any, labels: Any, confidences: Any) -> None:
+    """Fills labels and confidences (K,) for pixels (K, 2).
+
+    lies: width and height of the image, cells per pixel both ways, and where its first pixel is, see ScoreMap._cells.
+    """
+    width, height, per_u, per_v, first_x, first_y = lies
     rows, columns, classes = scores.shape
     here = np.empty(classes, dtype=np.float32)
     for k in range(len(pixels)):
         u, v = pixels[k, 0], pixels[k, 1]
-        labels[k], sure[k] = -1, 0.0
         if not (u >= -0.5 and v >= -0.5 and u < width - 0.5 and v < height - 0.5):
+            labels[k], confidences[k] = -1, 0.0
             continue
-        x = min(max(((u + 0.5) * gain_u + (left_px - 0.5) + 0.5) / cell_u - 0.5, 0.0), columns - 1.0)
-        y = min(max(((v + 0.5) * gain_v + (top_px - 0.5) + 0.5) / cell_v - 0.5, 0.0), rows - 1.0)
+        x = min(max(u * per_u + first_x, 0.0), columns - 1.0)
+        y = min(max(v * per_v + first_y, 0.0), rows - 1.0)
         left, top = int(x), int(y)
         right, bottom = min(left + 1, columns - 1), min(top + 1, rows - 1)
         a, b = np.float32(x - left), np.float32(y - top)
-        best = 0
-        for c in range(classes):
-            upper = scores[top, left, c] * (1 - a) + scores[top, right, c] * a
-            lower = scores[bottom, left, c] * (1 - a) + scores[bottom, right, c] * a
-            here[c] = upper * (1 - b) + lower * b
-            if here[c] > here[best]:
-                best = c
-        labels[k] = best
-        if is_probability:
-            sure[k] = here[best]
-            continue
-        total = np.float32(0.0)
-        for c in range(classes):
-            total += np.exp(here[c] - here[best])
-        sure[k] = np.float32(1.0) / total
+        upper = sure[top, left] * (1 - a) + sure[top, right] * a
+        lower = sure[bottom, left] * (1 - a) + sure[bottom, right] * a
+        confidences[k] = upper * (1 - b) + lower * b
+        winner = best[top, left]
+        # what wins in all four cells wins between them
+        if best[top, right] != winner or best[bottom, left] != winner or best[bottom, right] != winner:
+            for c in range(classes):
+                upper = scores[top, left, c] * (1 - a) + scores[top, right, c] * a
+                lower = scores[bottom, left, c] * (1 - a) + scores[bottom, right, c] * a
+                here[c] = upper * (1 - b) + lower * b
+            winner = 0
+            for c in range(1, classes):
+                if here[c] > here[winner]:
+                    winner = c
+        labels[k] = winner
 
 
 @njit(cache=True, nogil=True)

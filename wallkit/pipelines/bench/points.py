@@ -33,13 +33,13 @@ from wallkit.localize.filter import monte_carlo_localizer
 from wallkit.localize.settings import LocalizeSettings
 from wallkit.pipelines.bench.update import bench_scene
 from wallkit.points.filters import FILTERS, apply_filters
-from wallkit.points.labels import labelled_scan
+from wallkit.points.labels import labelled_scan, labels_by_beam, thinned
 from wallkit.points.look import ClassesAt, LookSettings, look, project_frame
 from wallkit.points.outlines import classes_in
 from wallkit.segment.letterbox import letterbox
 from wallkit.segment.scores import ScoreMap
 
-ROUNDS = 200
+ROUNDS = 400
 _WIDTH, _HEIGHT = 640, 480
 _CLASSES = ("wall", "person", BACKGROUND)
 _POSE = np.array([7.3, 6.1, 0.4])
@@ -78,7 +78,8 @@ def time_filter(beams: int, polygons: int, corners: int, particles: int) -> list
     """The camera filter without its network, part by part, and a whole update with and without it.
 
     All beams land on the image. The update of both is the class-conditional filter's with as many particles. The scores are
-    a grid as the default model's, which `points.look.lookup` asks unless it is told to make polygons of them.
+    a grid as the default model's, which `points.look.lookup` asks unless it is told to make polygons of them. Parts look up
+    every return; a filtered update so many as `points.look.returns` says, and the basic one stands there with as few too.
     """
     rng, fields = np.random.default_rng(0), bench_scene(400)
     frame, view, calibration = _moment(fields, beams)
@@ -88,7 +89,7 @@ def time_filter(beams: int, polygons: int, corners: int, particles: int) -> list
     sharp, exact = LookSettings(lookup="crossing_number", margins=0), LookSettings(lookup="crossing_number")
     by_number = classes_in(things, _CLASSES, (_HEIGHT, _WIDTH), "crossing_number")
     by_mask = classes_in(things, _CLASSES, (_HEIGHT, _WIDTH), "mask")
-    by_scores = _scores(rng).classes_at
+    by_scores = _scores(rng, by_number).classes_at
     located = {s: project_frame(calibration, frame, view, T_lidar_base, s) for s in (sharp, exact)}
     looked = look(located[exact], by_number, class_of, 3)
     labels = BeamLabels(frame.stamp_ns, looked.labels, _CLASSES, looked.confidences, looked.shares)
@@ -96,13 +97,13 @@ def time_filter(beams: int, polygons: int, corners: int, particles: int) -> list
     estimate = Estimate(0, _POSE, np.eye(3) * 1e-4, Health.LOCALIZED)
     filters = {name: FILTERS[name]().on(fields) for name in FILTERS}
 
-    def filtered(settings: LookSettings, classes_at: ClassesAt = by_number) -> LabelledScan:
-        seen = look(project_frame(calibration, frame, view, T_lidar_base, settings), classes_at, class_of, 3)
-        shown = BeamLabels(frame.stamp_ns, seen.labels, _CLASSES, seen.confidences, seen.shares)
-        return apply_filters([filters["wall_mask"]], labelled_scan(replace(frame, labels=shown)), estimate)
+    def filtered(settings: LookSettings, classes_at: ClassesAt = by_number, returns: int = 0) -> LabelledScan:
+        few = thinned(frame, returns)
+        seen = look(project_frame(calibration, few, view, T_lidar_base, settings), classes_at, class_of, 3)
+        shown = labels_by_beam(few, [seen], _CLASSES)
+        return apply_filters([filters["wall_mask"]], labelled_scan(replace(few, labels=shown)), estimate)
 
-    update = _updates(fields, particles)
-    bare = labelled_scan(frame)
+    update, usual = _updates(fields, particles), LookSettings().returns
     work: dict[str, Callable[[], object]] = {
         "project": lambda: project_frame(calibration, frame, view, T_lidar_base, sharp),
         "points in polygons": lambda: look(located[sharp], by_number, class_of, 3),
@@ -111,32 +112,34 @@ def time_filter(beams: int, polygons: int, corners: int, particles: int) -> list
         "filter: project, polygons, weights": lambda: filtered(sharp),
         "filter, with margins": lambda: filtered(exact),
         "filter, with margins, by mask": lambda: filtered(exact, by_mask),
-        "update, basic": lambda: update(bare),
-        "update, filtered": lambda: update(filtered(sharp)),
-        "update, filtered with margins": lambda: update(filtered(exact)),
-        "update, filtered with margins, by mask": lambda: update(filtered(exact, by_mask)),
+        "filter, with margins, by a net's scores": lambda: filtered(exact, by_scores),
+        "update, basic": lambda: update(labelled_scan(frame)),
+        f"update, basic, {usual} returns": lambda: update(labelled_scan(thinned(frame, usual))),
+        "update, filtered": lambda: update(filtered(sharp, returns=usual)),
+        "update, filtered with margins": lambda: update(filtered(exact, returns=usual)),
+        "update, filtered with margins, every return": lambda: update(filtered(exact)),
+        "update, filtered with margins, by mask": lambda: update(filtered(exact, by_mask, usual)),
+        "update, filtered with margins, by scores": lambda: update(filtered(exact, by_scores, usual)),
         "polygons packed, once per image": lambda: classes_in(things, _CLASSES, (_HEIGHT, _WIDTH), "crossing_number"),
         "mask drawn, once per image": lambda: classes_in(things, _CLASSES, (_HEIGHT, _WIDTH), "mask"),
-        # last, as its half a megabyte takes the caches of what follows
-        "filter, with margins, by a net's scores": lambda: filtered(exact, by_scores),
-        "update, filtered with margins, by scores": lambda: update(filtered(exact, by_scores)),
     }
     parts = {part.name: part for part in _timed(work, {})}
     basic = parts["update, basic"].median_ms
-    for name in (name for name in parts if name.startswith("update, filtered")):
+    for name in (name for name in parts if name.startswith("update, ") and name != "update, basic"):
         parts[name] = replace(parts[name], note=f"{parts[name].median_ms / basic:.2f} x basic")
     return list(parts.values())
 
 
 def _timed(work: Mapping[str, Callable[[], object]], notes: Mapping[str, str]) -> list[Part]:
-    """All take turns, so that a slow spell of the machine hits all of them."""
+    """All take turns, so that a slow spell of the machine hits all; in a drawn order, as each finds another's caches."""
     times: dict[str, list[float]] = {name: [] for name in work}
     for run in work.values():
         run()
+    rng, names = np.random.default_rng(0), list(work)
     for _ in range(ROUNDS):
-        for name, run in work.items():
+        for name in (names[i] for i in rng.permutation(len(names))):
             began = time.thread_time_ns()
-            run()
+            work[name]()
             times[name].append((time.thread_time_ns() - began) / 1e6)
     return [
         Part(name, float(np.median(t)), float(np.percentile(t, 95)), notes.get(name, "")) for name, t in times.items()
@@ -180,11 +183,18 @@ def _moment(fields: FieldSet, beams: int) -> tuple[Frame, View, Calibration]:
     return Frame(0, points, np.zeros(3)), view, calibration
 
 
-def _scores(rng: np.random.Generator) -> ScoreMap:
-    """Of twelve classes for each second pixel of an input of 192 x 256; three of the twelve are those of the bench."""
+def _scores(rng: np.random.Generator, classes_at: ClassesAt) -> ScoreMap:
+    """The same picture as a net sees it: twelve classes for each second pixel of an input of 192 x 256.
+
+    Of the twelve the first three are those of the bench.
+    """
     names = tuple(_CLASSES[i % 3] for i in range(12))
-    cells = rng.normal(0, 4, (12, 16, 12)).astype(np.float32).repeat(8, axis=0).repeat(8, axis=1)
-    return ScoreMap(names, names, letterbox((_HEIGHT, _WIDTH), (192, 256)), cells, is_probability=False)
+    frame = letterbox((_HEIGHT, _WIDTH), (192, 256))
+    cells = 2.0 * np.stack(np.meshgrid(np.arange(128), np.arange(96)), axis=-1) + 0.5
+    shown, _ = classes_at(frame.image_from_net(cells.reshape(-1, 2)))
+    scores = rng.normal(0, 1, (96, 128, 12)).astype(np.float32)
+    scores[np.arange(96)[:, None], np.arange(128), shown.reshape(96, 128)] += 8
+    return ScoreMap(names, names, frame, scores, is_probability=False)
 
 
 def _blobs(rng: np.random.Generator, polygons: int, corners: int) -> list[Float64Array]:

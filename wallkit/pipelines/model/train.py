@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import wallkit
-from wallkit.dataset.read import TrainingSet, read_pair, read_training_set
-from wallkit.errors import DatasetError, ModelError
+from wallkit.dataset.read import TrainingSet, read_pair, read_training_sets
+from wallkit.errors import ModelError
 from wallkit.pipelines.model.evaluate import Judged, evaluate_model
 from wallkit.pipelines.outputs import check_out, put_in_place
 from wallkit.pipelines.run_folder import write_json
@@ -130,13 +130,7 @@ def check_request(request: TrainRequest, out: Path, *, overwrite: bool) -> tuple
             width, height = request.size
             hint = f"--size 256x192; sides are multiples of {_MULTIPLE} from 64 to 1280"
             raise ModelError(f"a network for pictures of {width} x {height}", hint=hint)
-    sets = tuple(read_training_set(folder) for folder in request.datasets)
-    for one in sets:
-        if one.names != sets[0].names:
-            said = f"its classes are {', '.join(one.names)}; those of {sets[0].folder} {', '.join(sets[0].names)}"
-            raise DatasetError(said, where=one.folder, hint="make both with the same --classes")
-        for split in ("train", "val"):
-            one.of(split)
+    sets = read_training_sets(request.datasets)
     check_libraries()
     return sets
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from wallkit.dataset.read import TrainingSet, read_training_set
+from wallkit.dataset.read import TrainingSet, read_training_sets
 from wallkit.errors import ModelError
 from wallkit.pipelines.outputs import check_out, result_folder
 from wallkit.pipelines.run_folder import sha256, write_json
@@ -56,16 +56,17 @@ def train_yolo_model(
     Raises:
         OutputError, DatasetError: see check_yolo. ModelError: the child cannot train.
     """
-    found = check_yolo(request, out, overwrite=overwrite)
+    sets = check_yolo(request, out, overwrite=overwrite)
+    names = " and ".join(one.folder.name for one in sets)
     with result_folder(out, overwrite=overwrite) as folder:
-        checkpoint, onnx = train_yolo(request.python, _data(found, folder), folder, request.lesson, told=told)
+        checkpoint, onnx = train_yolo(request.python, _data(sets, folder), folder, request.lesson, told=told)
         results = (folder / "train" / "results.csv").read_text("utf-8")
         shutil.copy(onnx, folder / "model.onnx")
         shutil.copy(checkpoint, folder / "model.pt")
         epochs = epochs_of(results)
         (folder / "curves.csv").write_text(csv_of(epochs), encoding="utf-8")
         words = {"measure": "average precision of masks", "mean_label": "mAP50-95"}
-        draw_curves(epochs, folder / "curves.png", title=f"{request.start} on {found.folder.name}", **words)
+        draw_curves(epochs, folder / "curves.png", title=f"{request.start} on {names}", **words)
         (folder / "data.yaml").unlink()
         shutil.rmtree(folder / "train")
         record = {
@@ -73,37 +74,32 @@ def train_yolo_model(
             "command": "model train",
             "licence": "AGPL-3.0",
             "start": request.start,
-            "dataset": {"folder": found.folder.name, "manifest_sha256": found.sha256},
+            "datasets": [{"folder": one.folder.name, "manifest_sha256": one.sha256} for one in sets],
             "sha256": sha256(folder / "model.onnx"),
         }
         write_json(folder / "run.json", record)
     return YoloTrained(out / "model.onnx", epochs)
 
 
-def check_yolo(request: YoloRequest, out: Path, *, overwrite: bool) -> TrainingSet:
-    """The training set; refuses what cannot be done before anything is.
+def check_yolo(request: YoloRequest, out: Path, *, overwrite: bool) -> tuple[TrainingSet, ...]:
+    """The training sets; refuses what cannot be done before anything is.
 
     Raises:
-        OutputError: `out` cannot be used. DatasetError: the set cannot be read. ModelError: no interpreter, or several sets.
+        OutputError: `out` cannot be used. DatasetError: a set cannot be read, or has other classes.
+        ModelError: no interpreter.
     """
     check_out(out, overwrite=overwrite)
-    if len(request.datasets) != 1:
-        raise ModelError(
-            f"{len(request.datasets)} training sets, YOLO takes one", hint="make one set with more pictures"
-        )
     if not request.python or shutil.which(request.python) is None:
         said = f"'{request.python}' is no interpreter" if request.python else "which interpreter has Ultralytics?"
         raise ModelError(said, where="--python", hint="set one up, then pass --python yv/bin/python:\n" + SETUP)
-    found = read_training_set(request.datasets[0])
-    for split in ("train", "val"):
-        found.of(split)
-    return found
+    return read_training_sets(request.datasets)
 
 
-def _data(found: TrainingSet, folder: Path) -> Path:
+def _data(sets: tuple[TrainingSet, ...], folder: Path) -> Path:
     """A data.yaml with whole paths: Ultralytics takes relative ones from a folder of its own."""
-    names = "\n".join(f"  {number}: {name}" for number, name in enumerate(found.names))
+    lines = ["names:", *(f"  {number}: {name}" for number, name in enumerate(sets[0].names))]
+    for split in ("train", "val"):
+        lines += [f"{split}:", *(f"  - {one.folder.absolute() / 'images' / split}" for one in sets)]
     path = folder / "data.yaml"
-    text = f"path: {found.folder.absolute()}\ntrain: images/train\nval: images/val\nnames:\n{names}\n"
-    path.write_text(text, encoding="utf-8")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
