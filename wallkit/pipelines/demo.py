@@ -37,6 +37,8 @@ LOG, MAP, CALIBRATION = SAMPLE / "log.mcap", SAMPLE / "floor.wkmap.urdf", SAMPLE
 SEEDS = 3
 # after the robot was found: until then the error is metres, and says more about the first guess than about the method
 COMPARED = ("ate_median_m", "updates_to_converge")
+# of a class with fewer returns in a run, the share says little
+_ENOUGH = 200
 
 Seeds = Sequence[tuple[RunRecord, Evaluation]]
 
@@ -178,8 +180,22 @@ def surprises(found: Demo, expected: dict[str, Any]) -> tuple[str, ...]:
             where = f"{name}, seed {record.run['seed']}"
             if record.answer["health"] != expected["health"]:
                 said.append(f"{where}: ends {record.answer['health']}, expected {expected['health']}")
-            said += _outside(where, {**evaluation.metrics, **record.resources}, ranges)
+            said += _outside(where, numbers_of(record, evaluation), ranges)
     return tuple(said)
+
+
+def numbers_of(record: RunRecord, evaluation: Evaluation) -> dict[str, Value]:
+    """What expected.json has ranges for: metrics, resources, and of each class how much of its returns was kept.
+
+    The share that is kept of all returns tells little: a filter that drops walls and keeps people may have the same.
+    """
+    classes = record.run.get("filtering", {}).get("classes", {})
+    kept = {
+        f"kept_share of {name}": Value(f"kept_share of {name}", of["kept"] / of["returns"], "share", "")
+        for name, of in classes.items()
+        if of["returns"] >= _ENOUGH
+    }
+    return {**evaluation.metrics, **record.resources, **kept}
 
 
 def map_answer(judged: Judged) -> str:
