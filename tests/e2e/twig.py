@@ -7,6 +7,7 @@ import json
 import os
 import pkgutil
 import sys
+import tempfile
 import traceback
 import warnings
 from typing import Any
@@ -25,6 +26,7 @@ OTHERS = (
 def serve() -> None:
     """Requests, a line of JSON each, until the pipe ends; after each command the line of its exit code."""
     _import_all()
+    _load_kernels()
     for line in sys.stdin:
         pid = os.fork()
         if pid == 0:
@@ -42,6 +44,24 @@ def _import_all() -> None:
         importlib.import_module(name)
     # threads that libraries start at import do nothing here that a child would miss
     warnings.filterwarnings("ignore", message=".*fork.*", category=DeprecationWarning)
+
+
+def _load_kernels() -> None:
+    """Two seconds of the sample, localized and thrown away: compiled functions are read from disk once, not by every child."""
+    import cv2
+    import click.testing
+
+    from wallkit.cli.app import main
+    from wallkit.pipelines.demo import LOG, MAP
+
+    # a child has no threads but its first: OpenCV must not begin any here that it would then wait for
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    with tempfile.TemporaryDirectory() as scratch:
+        words = ["localize", str(LOG), "--map", str(MAP), "--end", "2", "--out", f"{scratch}/run", "--quiet"]
+        done = click.testing.CliRunner().invoke(main, words)
+    assert done.exception is None or isinstance(done.exception, SystemExit), done.output
+    cv2.setNumThreads(threads)
 
 
 def _be_the_command(request: dict[str, Any]) -> None:
