@@ -51,6 +51,18 @@ def test_every_log_with_every_configuration_and_seed(folder):
     assert [len(piece) for piece in many.pieces(lambda key: True)] == [PIECE, PIECE, 40 - 2 * PIECE]
 
 
+@pytest.mark.parametrize("word", ["logs", "logs/*/log.mcap", "logs/**/*.mcap", "logs/*"])
+def test_what_is_still_being_written_is_no_log_yet(tmp_path, word):
+    """Commands write into .NAME.partial-PID; who names it gets it."""
+    for name in ("a", ".b.partial-7"):
+        (tmp_path / "logs" / name).mkdir(parents=True)
+        (tmp_path / "logs" / name / "log.mcap").write_bytes(b"")
+    assert find_logs([word], tmp_path, where="batch.toml") == [str(tmp_path / "logs/a/log.mcap")]
+    assert find_logs(["logs/.b*/log.mcap"], tmp_path, where="batch.toml") == [
+        str(tmp_path / "logs/.b.partial-7/log.mcap")
+    ]
+
+
 def test_the_key_is_of_contents_and_not_of_places(folder):
     text = 'logs = ["hall/log.mcap"]\nmaps = ["floor.yaml"]\n[settings.localize]\nparticles = 300\n'
     known = {}

@@ -109,11 +109,18 @@ def _named(word: str, folder: Path, suffixes: Sequence[str]) -> Iterator[Path]:
             (Path(path.anchor), str(path.relative_to(path.anchor))) if path.is_absolute() else (folder, word)
         )
         for match in sorted(root.glob(pattern)):
+            if _is_hidden(match.relative_to(root)) and not _is_hidden(Path(pattern)):
+                continue
             yield from _inside(match, suffixes) if match.is_dir() else (match,)
     elif (folder / path).is_dir():
         yield from _inside(folder / path, suffixes)
     elif (folder / path).exists():
         yield folder / path
+
+
+def _is_hidden(path: Path) -> bool:
+    """Whether a part of it is, as of folders that are still being written."""
+    return any(part.startswith(".") and part not in (".", "..") for part in path.parts)
 
 
 def _inside(folder: Path, suffixes: Sequence[str]) -> Iterator[Path]:
@@ -122,6 +129,8 @@ def _inside(folder: Path, suffixes: Sequence[str]) -> Iterator[Path]:
         yield folder
         return
     for path in sorted(folder.iterdir()):
+        if path.name.startswith("."):
+            continue
         if path.is_dir():
             yield from _inside(path, suffixes)
         elif path.suffix in suffixes and path.name != RESULT_MCAP:
