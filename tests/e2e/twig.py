@@ -47,9 +47,9 @@ def _import_all() -> None:
 
 
 def _load_kernels() -> None:
-    """Two seconds of the sample, localized and thrown away: compiled functions are read from disk once, not by every child."""
-    import cv2
+    """Two seconds of the sample, localized and thrown away: compiled functions are read once, not by every child."""
     import click.testing
+    import cv2
 
     from wallkit.cli.app import main
     from wallkit.pipelines.demo import LOG, MAP
