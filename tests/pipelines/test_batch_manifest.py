@@ -78,6 +78,15 @@ def test_the_key_is_of_contents_and_not_of_places(folder):
     assert first(folder, moved, known).key != before.key
 
 
+@pytest.mark.parametrize("words", ['model = "default"\n', '[settings.segment]\nmodel = "default"\n'])
+def test_another_default_model_is_another_input(folder, words, monkeypatch):
+    text = 'logs = ["hall/log.mcap"]\nmaps = ["floor.yaml"]\n' + words
+    before = first(folder, text, {})
+    (folder / "newer.onnx").write_bytes(b"a model")
+    monkeypatch.setattr("wallkit.segment.default._FILE", folder / "newer.onnx")
+    assert first(folder, text, {}).key != before.key
+
+
 def test_memory_does_not_grow_with_the_number_of_runs(folder):
     def peak(seeds: int) -> int:
         plan = planned(folder, f'logs = ["hall"]\nseeds = {list(range(seeds))}')

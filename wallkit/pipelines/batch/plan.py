@@ -29,6 +29,7 @@ from wallkit.pipelines.batch.files import (
 from wallkit.pipelines.batch.manifest import Configuration, Manifest, Read, merged
 from wallkit.pipelines.batch.remote import bare, is_address
 from wallkit.pipelines.config import Config
+from wallkit.segment.default import model_path
 from wallkit.simulate.scenario import Scenario
 
 # so many runs over one log go to one process, which reads it once; the next go to whoever is free
@@ -268,7 +269,9 @@ def _with_content(effective: dict[str, Any], known: Digests) -> dict[str, Any]:
 
 
 def _content_of(words: str, known: Digests) -> str:
-    return digest(Path(words), known) if words and Path(words).is_file() else words
+    """The digest of a model's file, the package's own too; words that name none (the oracle) as they are."""
+    path = model_path(Path(words)) if words else None
+    return digest(path, known) if path is not None and path.is_file() else words
 
 
 def _file_of(words: str, folder: Path) -> str:
