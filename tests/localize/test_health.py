@@ -11,7 +11,6 @@ from tests.localize.worlds import FLAT, fields_of, scan_at
 from wallkit.core.raycast import HIT, LONG, SHORT, classify_rays
 from wallkit.core.types import Health, Mode
 from wallkit.localize.health import (
-    Evidence,
     HealthSettings,
     Trust,
     count_updates,
@@ -87,11 +86,27 @@ def test_what_is_bad_depends_on_what_is_usual_here():
     assert after([so_so], Trust(Health.LOCALIZED, "", is_confirmed=True, usual=0.85)).health is Health.LOCALIZED
 
 
-def test_a_scan_that_reaches_nothing_says_nothing_until_it_lasts():
-    nothing = evidence(0.02, 0.01)
-    assert after([nothing]).health is Health.UNCERTAIN
-    assert after([nothing]).is_confirmed
-    assert after([nothing] * SETTINGS.doubtful_updates_to_lose).health is Health.LOST
+def test_people_all_around_are_no_doubt_about_the_place_unless_they_stay():
+    hidden = evidence(0.02, 0.01)
+    once = after([hidden])
+    assert once.health is Health.UNCERTAIN
+    assert once.is_confirmed
+    assert "nothing of it is seen" in once.reason
+    almost = after([hidden] * (SETTINGS.shut_in_updates_to_lose - 1))
+    assert almost.health is Health.UNCERTAIN
+    assert almost.is_confirmed
+    assert after([evidence(0.98, 0.0)], almost).health is Health.LOCALIZED
+    lost = after([hidden], almost)
+    assert lost.health is Health.LOST
+    assert not lost.is_confirmed
+    # a robot that stands still among them learns nothing by waiting
+    assert after([hidden] * 200, is_forced=True).health is Health.UNCERTAIN
+
+
+def test_returns_that_are_missing_are_nobody_all_around():
+    few = Evidence(np.full(3, HIT, np.int8), 0.05, 0.0, 0.0, TIGHT, 0.0)
+    assert after([few]).is_confirmed
+    assert after([few] * SETTINGS.doubtful_updates_to_lose).health is Health.LOST
 
 
 def test_a_gap_or_a_jump_makes_it_a_hypothesis():

@@ -38,8 +38,6 @@ from wallkit.localize.slip import describe_slip, look_around
 _STILL = np.zeros(3)
 # a spread below this is finer than the map: half a cell and a tenth of a degree
 _SD_FLOOR = (0.01, 0.01, np.deg2rad(0.1))
-# share of returns nearer than the map says from which people may be all around
-_SHUT_IN = 0.5
 
 
 @dataclass(frozen=True)
@@ -247,7 +245,7 @@ class MonteCarloLocalizer:
         in look like a wall somewhere: of such a scan most is nearer than the map says, and nothing lies behind its walls.
         """
         doubtful = raises_doubt(self.settings.health, belief.trust, here.evidence)
-        if here.evidence.short > _SHUT_IN and not doubtful:
+        if here.evidence.short > self.settings.health.shut_in and not doubtful:
             return False
         slip, trust = self.settings.slip, belief.trust
         at_here, at_near = self.likelihood.log_likelihood(np.stack([here.pose, near_by.pose]), scan)

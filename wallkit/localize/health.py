@@ -4,6 +4,9 @@ Spread alone cannot tell "well localized among people" from "confidently wrong".
 mapped surface is somebody standing there (clutter), a return *behind* a mapped surface has gone through a wall, and only a
 wrong pose does that. So a pose is judged by hit / (hit + long), and clutter only by whether enough hits are left.
 
+People who stand all around the robot hide the map: nothing fits and nothing contradicts. That is no doubt about the place,
+and a search with such a scan would find a room as small as their circle. So odometry carries the estimate on, for a while.
+
 A hypothesis starts unconfirmed. It is confirmed by updates that fit and by a search that finds no rival, and it is given
 up after updates that do not fit.
 """
@@ -39,6 +42,10 @@ class HealthSettings:
     rival_share_max: float = setting(0.05, "largest share of the belief outside the best cluster", low=0, high=1)
     bad_updates_to_lose: int = setting(2, "updates in a row against a hypothesis that end it", low=1)
     doubtful_updates_to_lose: int = setting(6, "updates in a row that do not speak for it that end it", low=1)
+    shut_in: float = setting(
+        0.5, "share of returns nearer than the map from which people hide it, if next to none reach it", low=0, high=1
+    )
+    shut_in_updates_to_lose: int = setting(40, "updates in a row with the map hidden that end it", low=1)
     good_updates_to_trust: int = setting(
         4, "updates in a row for a new hypothesis that confirm it if it has no rival", low=1
     )
@@ -83,7 +90,7 @@ class Trust:
     Attributes:
         health, reason: the last verdict, and why, in words.
         is_confirmed: the hypothesis was given or has been checked.
-        good, bad, doubtful: updates in a row for it, against it, and not for it.
+        good, bad, doubtful: updates in a row for it, against it, and not for it. shut_in: with the map hidden.
         good_path_m: path driven during the updates in a row for it.
         usual: running mean of hit / (hit + long) while LOCALIZED: how good this map is where the robot is; 0 before.
         usual_hits: the same of the share of hits.
@@ -95,6 +102,7 @@ class Trust:
     good: int = 0
     bad: int = 0
     doubtful: int = 0
+    shut_in: int = 0
     good_path_m: float = 0.0
     usual: float = 0.0
     usual_hits: float = 0.0
@@ -122,6 +130,11 @@ def raises_doubt(s: HealthSettings, trust: Trust, e: Evidence) -> bool:
     return e.hit + e.long >= s.least_reached and e.explained < max(s.good_explained, s.good_of_usual * trust.usual)
 
 
+def is_shut_in(s: HealthSettings, e: Evidence) -> bool:
+    """Whether something all around the robot hides the map, so that an update says nothing."""
+    return e.hit + e.long < s.least_reached and e.short >= s.shut_in
+
+
 def count_updates(
     settings: HealthSettings,
     before: Trust,
@@ -140,15 +153,18 @@ def count_updates(
         is_forced: the robot stood still: seeing the same doubtful scan again and again is no new doubt.
     """
     is_good, is_bad = speaks_for(settings, before, evidence), speaks_against(settings, before, evidence)
+    is_hidden = is_shut_in(settings, evidence)
     good = before.good + 1 if is_good else 0
     bad = before.bad + 1 if is_bad else 0
-    doubtful = 0 if is_good else before.doubtful + (not is_forced)
-    is_lost = bad >= settings.bad_updates_to_lose or doubtful >= settings.doubtful_updates_to_lose
+    doubtful = 0 if is_good else before.doubtful + (not is_forced and not is_hidden)
+    shut_in = before.shut_in + (not is_forced) if is_hidden else 0
+    trust = replace(before, good=good, bad=bad, doubtful=doubtful, shut_in=shut_in)
+    is_lost = bad >= settings.bad_updates_to_lose or _is_worn_out(settings, trust)
     confirmed = before.is_confirmed and not (is_lost or has_jumped or gap_s > settings.odometry_gap_s)
     if has_jumped or (before.is_confirmed and not confirmed):
         good = min(good, 1)
     path = before.good_path_m + path_m if good > 1 else 0.0
-    return replace(before, is_confirmed=confirmed, good=good, bad=bad, doubtful=doubtful, good_path_m=path)
+    return replace(trust, is_confirmed=confirmed, good=good, good_path_m=path)
 
 
 def is_ripe(settings: HealthSettings, trust: Trust, evidence: Evidence) -> bool:
@@ -187,6 +203,11 @@ def judge(settings: HealthSettings, trust: Trust, evidence: Evidence, *, slip: s
     return replace(trust, health=health, reason=reason, usual=usual, usual_hits=usual_hits)
 
 
+def _is_worn_out(s: HealthSettings, trust: Trust) -> bool:
+    """Whether nothing has spoken for a hypothesis for too long."""
+    return trust.doubtful >= s.doubtful_updates_to_lose or trust.shut_in >= s.shut_in_updates_to_lose
+
+
 def _verdict(s: HealthSettings, trust: Trust, e: Evidence) -> tuple[Health, str]:
     through = f"{e.long:.0%} of the returns lie behind mapped walls"
     if speaks_against(s, trust, e):
@@ -194,7 +215,9 @@ def _verdict(s: HealthSettings, trust: Trust, e: Evidence) -> tuple[Health, str]
             return Health.UNCERTAIN, f"this scan does not fit the map: {through}"
         return Health.LOST, f"the scan does not fit the map: {through}"
     if not speaks_for(s, trust, e):
-        health = Health.UNCERTAIN if trust.doubtful < s.doubtful_updates_to_lose else Health.LOST
+        health = Health.LOST if _is_worn_out(s, trust) else Health.UNCERTAIN
+        if is_shut_in(s, e):
+            return health, f"{e.short:.0%} of the returns end before the map: nothing of it is seen"
         return health, f"only {e.hit:.0%} of the returns fit the map, {through}"
     if not trust.is_confirmed:
         return Health.UNCERTAIN, f"a hypothesis, not yet confirmed ({trust.good} updates in a row for it)"
