@@ -11,6 +11,7 @@ from tests.localize.worlds import FLAT, fields_of, scan_at
 from wallkit.core.raycast import HIT, LONG, SHORT, classify_rays
 from wallkit.core.types import Health, Mode
 from wallkit.localize.health import (
+    Evidence,
     HealthSettings,
     Trust,
     count_updates,

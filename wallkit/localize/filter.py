@@ -38,6 +38,8 @@ from wallkit.localize.slip import describe_slip, look_around
 _STILL = np.zeros(3)
 # a spread below this is finer than the map: half a cell and a tenth of a degree
 _SD_FLOOR = (0.01, 0.01, np.deg2rad(0.1))
+# share of returns nearer than the map says from which people may be the reason that a scan fits less
+_CROWDED = 0.35
 
 
 @dataclass(frozen=True)
@@ -241,11 +243,12 @@ class MonteCarloLocalizer:
     def _is_slip(self, belief: Belief, here: Answer, near_by: Answer, scan: LabelledScan) -> bool:
         """Whether the scan fits near by as well as is usual and so much better than here that odometry must be wrong.
 
-        A wrong place can turn people into walls, but then other returns lie behind walls there. And people who shut a robot
-        in look like a wall somewhere: of such a scan most is nearer than the map says, and nothing lies behind its walls.
+        A wrong place can turn people into walls, but then other returns lie behind walls there. And people who stand close
+        by look like a wall somewhere: where many returns are nearer than the map says and none lie behind its walls, nothing
+        says that here is wrong.
         """
         doubtful = raises_doubt(self.settings.health, belief.trust, here.evidence)
-        if here.evidence.short > self.settings.health.shut_in and not doubtful:
+        if here.evidence.short > _CROWDED and not doubtful:
             return False
         slip, trust = self.settings.slip, belief.trust
         at_here, at_near = self.likelihood.log_likelihood(np.stack([here.pose, near_by.pose]), scan)
