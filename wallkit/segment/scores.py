@@ -49,7 +49,7 @@ class ScoreMap:
         per_u, per_v = columns / self.frame.net[1], rows / self.frame.net[0]
         first = (0.5 * gain_u + left) * per_u - 0.5, (0.5 * gain_v + top) * per_v - 0.5
         lies = width, height, gain_u * per_u, gain_v * per_v, *first
-        _sample(at, self.scores, *self._winners, lies, labels, confidences)
+        _sample(at, self.scores, self.is_probability, *self._winners, lies, labels, confidences)
         return labels, confidences
 
     def labels(self) -> Int64Array:
@@ -63,14 +63,18 @@ class ScoreMap:
     def polygons(self, roles: Collection[str] | None = None) -> list[Polygon]:
         """See Segmentation; the confidences are those of the nearest cells."""
         columns, rows = (np.rint(line).astype(np.int64) for line in self._lines())
-        return polygons_of(self._labels, self._winners[1][np.ix_(rows, columns)], chosen(self.roles, roles))
+        best, sure = self._winners
+        _find_winners(self.scores, self.is_probability, best, sure)
+        return polygons_of(self._labels, sure[np.ix_(rows, columns)], chosen(self.roles, roles))
 
     @cached_property
     def _winners(self) -> tuple[NDArray[np.int16], Float32Array]:
-        """(h, w) the class of each cell, and how sure it is."""
-        best, sure = (np.empty(self.scores.shape[:2], dtype=kind) for kind in (np.int16, np.float32))
-        _find_winners(self.scores, self.is_probability, best, sure)
-        return best, sure
+        """(h, w) the class of each cell, and how sure it is; -1 until somebody asks for the cell.
+
+        Exponentials are what costs, and a scan touches one cell in ten.
+        """
+        cells = self.scores.shape[:2]
+        return np.full(cells, -1, dtype=np.int16), np.empty(cells, dtype=np.float32)
 
     @cached_property
     def _labels(self) -> Int64Array:
@@ -144,25 +148,40 @@ class IdMap:
 
 @njit(cache=True, nogil=True)
 def _find_winners(scores: Any, is_probability: Any, best: Any, sure: Any) -> None:
-    """Fills best and sure (h, w), once per image: the exponentials are what costs."""
-    rows, columns, classes = scores.shape
+    """Fills best and sure (h, w) in all cells."""
+    rows, columns, _ = scores.shape
     for i in range(rows):
         for j in range(columns):
-            winner = 0
-            for c in range(1, classes):
-                if scores[i, j, c] > scores[i, j, winner]:
-                    winner = c
-            best[i, j], sure[i, j] = winner, scores[i, j, winner]
-            if not is_probability:
-                total = np.float32(0.0)
-                for c in range(classes):
-                    total += np.exp(scores[i, j, c] - scores[i, j, winner])
-                sure[i, j] = np.float32(1.0) / total
+            _find_winner(scores, is_probability, best, sure, i, j)
 
 
 @njit(cache=True, nogil=True)
-def _sample(pixels: Any, scores: Any, best: Any, sure: Any, lies: Any, labels: Any, confidences: Any) -> None:
-    """Fills labels and confidences (K,) for pixels (K, 2).
+def _find_winner(scores: Any, is_probability: Any, best: Any, sure: Any, i: Any, j: Any) -> Any:
+    """The class of a cell; fills best and sure (h, w) there, unless they are."""
+    if best[i, j] >= 0:
+        return best[i, j]
+    classes = scores.shape[2]
+    winner = 0
+    for c in range(1, classes):
+        if scores[i, j, c] > scores[i, j, winner]:
+            winner = c
+    if is_probability:
+        sure[i, j] = scores[i, j, winner]
+    else:
+        total = np.float32(0.0)
+        for c in range(classes):
+            total += np.exp(scores[i, j, c] - scores[i, j, winner])
+        sure[i, j] = np.float32(1.0) / total
+    # last, as another thread may be looking
+    best[i, j] = winner
+    return best[i, j]
+
+
+@njit(cache=True, nogil=True)
+def _sample(
+    pixels: Any, scores: Any, is_probability: Any, best: Any, sure: Any, lies: Any, labels: Any, confidences: Any
+) -> None:
+    """Fills labels and confidences (K,) for pixels (K, 2), and best and sure (h, w) where they lie.
 
     lies: width and height of the image, cells per pixel both ways, and where its first pixel is, see ScoreMap._cells.
     """
@@ -179,12 +198,15 @@ def _sample(pixels: Any, scores: Any, best: Any, sure: Any, lies: Any, labels: A
         left, top = int(x), int(y)
         right, bottom = min(left + 1, columns - 1), min(top + 1, rows - 1)
         a, b = np.float32(x - left), np.float32(y - top)
+        winner = _find_winner(scores, is_probability, best, sure, top, left)
+        is_clear = True
+        for i, j in ((top, right), (bottom, left), (bottom, right)):
+            is_clear &= _find_winner(scores, is_probability, best, sure, i, j) == winner
         upper = sure[top, left] * (1 - a) + sure[top, right] * a
         lower = sure[bottom, left] * (1 - a) + sure[bottom, right] * a
         confidences[k] = upper * (1 - b) + lower * b
-        winner = best[top, left]
         # what wins in all four cells wins between them
-        if best[top, right] != winner or best[bottom, left] != winner or best[bottom, right] != winner:
+        if not is_clear:
             for c in range(classes):
                 upper = scores[top, left, c] * (1 - a) + scores[top, right, c] * a
                 lower = scores[bottom, left, c] * (1 - a) + scores[bottom, right, c] * a
