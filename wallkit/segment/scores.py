@@ -156,10 +156,10 @@ def _find_winners(scores: Any, is_probability: Any, best: Any, sure: Any) -> Non
 
 
 @njit(cache=True, nogil=True)
-def _find_winner(scores: Any, is_probability: Any, best: Any, sure: Any, i: Any, j: Any) -> Any:
-    """The class of a cell; fills best and sure (h, w) there, unless they are."""
+def _find_winner(scores: Any, is_probability: Any, best: Any, sure: Any, i: Any, j: Any) -> None:
+    """Fills best and sure (h, w) in one cell, unless they are."""
     if best[i, j] >= 0:
-        return best[i, j]
+        return
     classes = scores.shape[2]
     winner = 0
     for c in range(1, classes):
@@ -174,7 +174,6 @@ def _find_winner(scores: Any, is_probability: Any, best: Any, sure: Any, i: Any,
         sure[i, j] = np.float32(1.0) / total
     # last, as another thread may be looking
     best[i, j] = winner
-    return best[i, j]
 
 
 @njit(cache=True, nogil=True)
@@ -198,15 +197,15 @@ def _sample(
         left, top = int(x), int(y)
         right, bottom = min(left + 1, columns - 1), min(top + 1, rows - 1)
         a, b = np.float32(x - left), np.float32(y - top)
-        winner = _find_winner(scores, is_probability, best, sure, top, left)
-        is_clear = True
-        for i, j in ((top, right), (bottom, left), (bottom, right)):
-            is_clear &= _find_winner(scores, is_probability, best, sure, i, j) == winner
+        if min(best[top, left], best[top, right], best[bottom, left], best[bottom, right]) < 0:
+            for i, j in ((top, left), (top, right), (bottom, left), (bottom, right)):
+                _find_winner(scores, is_probability, best, sure, i, j)
         upper = sure[top, left] * (1 - a) + sure[top, right] * a
         lower = sure[bottom, left] * (1 - a) + sure[bottom, right] * a
         confidences[k] = upper * (1 - b) + lower * b
+        winner = best[top, left]
         # what wins in all four cells wins between them
-        if not is_clear:
+        if best[top, right] != winner or best[bottom, left] != winner or best[bottom, right] != winner:
             for c in range(classes):
                 upper = scores[top, left, c] * (1 - a) + scores[top, right, c] * a
                 lower = scores[bottom, left, c] * (1 - a) + scores[bottom, right, c] * a

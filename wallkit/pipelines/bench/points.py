@@ -89,7 +89,8 @@ def time_filter(beams: int, polygons: int, corners: int, particles: int) -> list
     sharp, exact = LookSettings(lookup="crossing_number", margins=0), LookSettings(lookup="crossing_number")
     by_number = classes_in(things, _CLASSES, (_HEIGHT, _WIDTH), "crossing_number")
     by_mask = classes_in(things, _CLASSES, (_HEIGHT, _WIDTH), "mask")
-    by_scores = _scores(rng, by_number).classes_at
+    scores = _scores(rng, by_number)
+    by_scores = scores.classes_at
     located = {s: project_frame(calibration, frame, view, T_lidar_base, s) for s in (sharp, exact)}
     looked = look(located[exact], by_number, class_of, 3)
     labels = BeamLabels(frame.stamp_ns, looked.labels, _CLASSES, looked.confidences, looked.shares)
@@ -120,6 +121,10 @@ def time_filter(beams: int, polygons: int, corners: int, particles: int) -> list
         "update, filtered with margins, every return": lambda: update(filtered(exact)),
         "update, filtered with margins, by mask": lambda: update(filtered(exact, by_mask, usual)),
         "update, filtered with margins, by scores": lambda: update(filtered(exact, by_scores, usual)),
+        # the first scan after an image finds out how sure the cells are
+        "update, filtered with margins, by new scores": lambda: update(
+            filtered(exact, replace(scores).classes_at, usual)
+        ),
         "polygons packed, once per image": lambda: classes_in(things, _CLASSES, (_HEIGHT, _WIDTH), "crossing_number"),
         "mask drawn, once per image": lambda: classes_in(things, _CLASSES, (_HEIGHT, _WIDTH), "mask"),
     }
