@@ -6,7 +6,9 @@ import contextlib
 import json
 import math
 import os
+import signal
 import sys
+import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator
@@ -30,7 +32,8 @@ class WallkitGroup(click.Group):
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
         try:
-            code = super().main(*args, **{**kwargs, "standalone_mode": False})
+            with _terminated_as_by_ctrl_c():
+                code = super().main(*args, **{**kwargs, "standalone_mode": False})
         # click.exceptions.Exit is a RuntimeError, so it comes before the bugs
         except click.exceptions.Exit as request:
             code = request.exit_code
@@ -52,6 +55,19 @@ class WallkitGroup(click.Group):
             click.echo("This is a bug in wallkit, not in your data: please report it with the lines above.", err=True)
             code = UNABLE
         sys.exit(code if isinstance(code, int) else OK)
+
+
+@contextlib.contextmanager
+def _terminated_as_by_ctrl_c() -> Iterator[None]:
+    """SIGTERM, which schedulers and services send before they kill, ends a command as Ctrl-C does."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
