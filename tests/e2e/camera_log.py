@@ -75,8 +75,8 @@ def png(pixels: np.ndarray) -> bytes:
 
 
 def write_log(path: Path, *, seconds=12.0, oracle=True, images=True, info_size=(WIDTH, HEIGHT), image_shift_ms=0,
-              only_floor=False) -> Path:  # fmt: skip
-    """10 Hz of scans, images 30 ms later, odometry at 50 Hz, the map and the truth in one log."""
+              only_floor=False, damaged=0) -> Path:  # fmt: skip
+    """10 Hz of scans, images 30 ms later, odometry at 50 Hz, the map and the truth in one log; so many images damaged."""
     rng = np.random.default_rng(0)
     poses = tour(WAY, 100.0)
     stamps = START_NS + (np.arange(len(poses)) * 10_000_000)
@@ -99,7 +99,8 @@ def write_log(path: Path, *, seconds=12.0, oracle=True, images=True, info_size=(
             ids[:] = CLASSES.index("floor")
         stamp = then + image_shift_ms * 1_000_000
         if images:
-            image = CameraImage(stamp, "camera_front", "png", picture(ids))
+            is_damaged = then < START_NS + damaged * 100_000_000
+            image = CameraImage(stamp, "camera_front", "png", picture(ids)[: 40 if is_damaged else None])
             messages.append((then, "/camera/front/image/compressed", image))
             P = np.hstack([K, np.zeros((3, 1))])
             info = CameraInfo(stamp, "camera_front", *info_size, "plumb_bob", np.zeros(5), K, np.eye(3), P)

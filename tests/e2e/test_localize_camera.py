@@ -17,6 +17,7 @@ from wallkit.logs.reader import open_log
 from wallkit.pipelines.cameras import CameraRequest
 from wallkit.pipelines.config import load_config
 from wallkit.pipelines.localize import Request, localize, prepare
+from wallkit.segment.class_map import class_map
 from wallkit.segment.fixture import USUAL, oracle
 
 ORACLE = {"model": "oracle"}
@@ -170,24 +171,93 @@ def test_only_images_for_updates_are_segmented_and_all_of_them_ahead(world):
     assert sum(name.startswith("segment") for name in threads) >= run.filtering.updates - 2
 
 
-def test_an_image_that_cannot_be_read_is_none(world):
-    given = ready(world, may_fall_back=True)
+def altered(given, change, *, after_s=4.0):
+    """The same run whose images are segmented by `change(segment, image)` from a time on."""
     segment = given.sight.segment
 
-    def broken(image):
-        if image.stamp_ns > camera_log.START_NS + 4 * 10**9:
-            raise LogError("no image")
-        return segment(image)
+    def other(image):
+        late = image.stamp_ns > camera_log.START_NS + round(after_s * 1e9)
+        return change(segment, image) if late else segment(image)
 
-    given.sight.segment = broken
+    given.sight.segment = other
+    return given
+
+
+def unreadable(segment, image):
+    raise LogError("no image")
+
+
+def failing(segment, image):
+    raise ModelError("the network answers with NaN", where="colours.onnx")
+
+
+def of_double_size(segment, image):
+    return class_map(np.repeat(np.repeat(segment(image).labels(), 2, axis=0), 2, axis=1), camera_log.CLASSES)
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [(unreadable, "its image cannot be read"), (of_double_size, "its image is 640 x 480, not 320 x 240 as its calib")],
+)
+def test_images_that_cannot_be_used_say_nothing_and_are_counted(world, change, why):
+    """The same as without them: what a camera said before stands, and no later return is on a person."""
+    run = localize(altered(ready(world), change))
+    found = run.filtering
+    assert 0 < found.without_image == sum(found.silent.values()) < found.updates
+    (line,) = (line for line in found.lines() if line.startswith("front: "))
+    assert why in line
+    assert f"at {found.without_image} of {found.updates} updates" in line
+    # no frame is without a label and with a weight of 0
+    assert found.by_class["not seen"][0] == found.by_class["not seen"][1]
+
+
+def test_later_seeds_say_the_same_about_images_that_cannot_be_used(world):
+    both = altered(ready(world, seeds=2), unreadable)
+    first, second = localize(both), localize(both)
+    assert first.filtering.silent == second.filtering.silent != {}
+
+
+def test_a_network_that_fails_ends_the_run_unless_the_lidar_may_stand_in(world):
+    with pytest.raises(ModelError, match="answers with NaN"):
+        localize(altered(ready(world), failing))
+    for _ in range(2):
+        given = altered(ready(world, may_fall_back=True), failing)
+        run = localize(given)
+        assert "colours.onnx: the network answers with NaN" in given.sight.given_up
+        assert run.filtering.lines()[-1].startswith("the LiDAR alone was used from then on: colours.onnx")
+        # what falls away is the filter, too, not only its labels
+        assert 0 < run.filtering.without_image < run.filtering.updates
+
+
+def test_a_model_that_never_sees_a_wall_is_given_up_when_the_lidar_may_stand_in(world, tmp_path):
+    bare = camera_log.write_log(tmp_path / "bare.mcap", only_floor=True)
+    words = ("points.wall_mask.unseen_weight=0",)
+    given = prepared(bare, calibrations=(world / "front.toml",), may_fall_back=True, words=words, **ORACLE)
     run = localize(given)
-    assert 0 < run.filtering.without_image < run.filtering.updates
+    assert "finds no wall, partition" in run.filtering.lines()[-1]
+    found = run.filtering
+    # the first twenty updates lose every return, those after keep every one
+    assert found.kept == found.by_class["not seen"][1]
+    assert found.few == 19
+    again = localize(given)
+    np.testing.assert_array_equal(again.steps.poses, run.steps.poses)
 
 
-def test_images_are_skipped_by_rate(world):
+def test_images_are_skipped_by_rate_and_that_is_said(world):
     often, seldom = localize(ready(world)), localize(ready(world, words=("segment.rate_hz=1",)))
-    assert seldom.filtering.without_image > 0
     assert seldom.filtering.images < often.filtering.images
+    skipped = {("front", "its image is skipped by segment.rate_hz"): seldom.filtering.without_image}
+    assert seldom.filtering.silent == skipped
+
+
+def test_a_recording_that_begins_with_a_damaged_image_is_used(world, tmp_path):
+    log = camera_log.write_log(tmp_path / "log.mcap", seconds=2, damaged=2)
+    model = str(world / "colours.onnx")
+    run = localize(prepared(log, calibrations=(world / "front.toml",), model=model))
+    assert run.filtering.images > 0
+    log = camera_log.write_log(tmp_path / "none.mcap", seconds=1, damaged=100)
+    with pytest.raises(LogError, match="begins with no readable image"):
+        prepared(log, calibrations=(world / "front.toml",), model=model)
 
 
 def test_a_failed_calibration_is_refused_unless_allowed(world, tmp_path):
@@ -278,13 +348,20 @@ def test_a_model_without_a_wall_is_refused_and_roles_can_be_said(world, tmp_path
         ready(world, model=str(path))
     assert "segment.roles.wall" in caught.value.hint
     assert ready(world, ("reject_dynamic",), model=str(path)).sight is not None
+    path.write_bytes(oracle({"bricks": USUAL["person"], "brickwork": USUAL["wall"]}, (256, 320), "class-scores"))
+    with pytest.raises(ModelError, match="no class counts as person or movable"):
+        ready(world, ("reject_dynamic",), model=str(path))
+    path.write_bytes(oracle({"person": USUAL["person"], "brickwork": USUAL["wall"]}, (256, 320), "class-scores"))
     assert ready(world, model=str(path), words=('segment.roles.wall=["brickwork"]',)).sight is not None
 
 
 def test_images_of_another_time_and_masks_without_walls_are_said_while_running(world, tmp_path):
     given = {"calibrations": (world / "front.toml",), **ORACLE}
     late = camera_log.write_log(tmp_path / "late.mcap", image_shift_ms=50_000)
-    with pytest.raises(LogError, match="none of the first 20 scans has an image within the tolerance"):
+    with pytest.raises(
+        LogError,
+        match=r"none of the first 20 scans has an image that can be used: no image within logs.image_tolerance_s",
+    ):
         localize(prepared(late, **given))
     run = localize(prepared(late, may_fall_back=True, **given))
     assert run.filtering.without_image == run.filtering.updates > 20

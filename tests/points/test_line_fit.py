@@ -80,3 +80,31 @@ def test_too_few_and_one_sided_are_noticed():
     scan = scan_at(corner, np.zeros(3), beams=360)
     few = kept_of(replace(scan, weights=np.where(np.arange(len(scan.weights)) < 20, 1, 0.3)), KeptSettings())
     assert (few.kept, few.is_few, few.is_one_sided) == (20, True, False)
+
+
+@pytest.mark.parametrize("side_m", [4.0, 10.0, 16.0, 22.0])
+@pytest.mark.parametrize("beams", [240, 1080])
+def test_a_square_room_holds_both_directions_alike_at_any_size_and_density(side_m, beams):
+    half = side_m / 2
+    room = plan_from_polylines([(-half, -half), (half, -half), (half, half), (-half, half), (-half, -half)])
+    scan = scan_at(room, np.array([0.01, 0.02, 0.0]), beams=beams, fov_rad=2 * np.pi, reach_m=30.0, sigma_m=0.02,
+                   rng=np.random.default_rng(0))  # fmt: skip
+    kept = kept_of(scan, KeptSettings())
+    assert kept.share_across == pytest.approx(0.5, abs=0.06)
+    assert not kept.is_one_sided
+
+
+@pytest.mark.parametrize("beams", [240, 1080])
+def test_noise_makes_no_second_direction_of_a_wall_close_by(beams):
+    wall = plan_from_polylines([(-8, 1), (8, 1)])
+    scan = scan_at(wall, np.zeros(3), beams=beams, fov_rad=2 * np.pi, sigma_m=0.03, rng=np.random.default_rng(0))
+    assert kept_of(scan, KeptSettings()).is_one_sided
+
+
+def test_returns_that_are_far_from_each_other_tell_nothing():
+    scan = scan_at(FLAT, POSE, beams=1080)
+    apart = np.flatnonzero(scan.weights)[::60]
+    few = replace(scan, weights=np.isin(np.arange(1080), apart).astype(np.float32))
+    kept = kept_of(few, KeptSettings(least=1))
+    assert np.isnan(kept.share_across)
+    assert not kept.is_one_sided

@@ -9,7 +9,9 @@ import pytest
 
 from tests.localize.worlds import FLAT, fields_of, scan_at
 from wallkit.core.types import Estimate, Health
+from wallkit.errors import ConfigError
 from wallkit.localize.class_conditional import ClassConditional
+from wallkit.pipelines.config import load_config
 from wallkit.points.filters import apply_filters
 from wallkit.points.mask_filters import RejectDynamic, SoftMask, WallMask
 
@@ -31,6 +33,13 @@ def labelled(shares, confidences=None):
 
 def weights(one, scan):
     return one.on(fields_of(FLAT)).weigh(scan, ANYWHERE).tolist()
+
+
+@pytest.mark.parametrize(("table", "word"), [("wall_mask.keep", "Door"), ("reject_dynamic.reject", "people")])
+def test_a_word_that_is_no_class_is_refused(table, word):
+    with pytest.raises(ConfigError, match=f"'{word}' is no class") as caught:
+        load_config(None, [f'points.{table}=["wall", "{word}"]'])
+    assert "one of: background, ceiling, door" in str(caught.value)
 
 
 ROWS = [[1, 0, 0, 0], [0.7, 0.3, 0, 0], [0.9, 0, 0.1, 0], [0, 0, 1, 0], [0, 0, 0, 1], [0, 0, 0, 0]]

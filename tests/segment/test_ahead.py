@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from wallkit.core.types import CameraImage, Frame, Points, View
-from wallkit.segment.ahead import LookReport, look_ahead
+from wallkit.segment.ahead import look_ahead
 from wallkit.segment.class_map import class_map
 
 EMPTY = np.zeros(0, dtype=np.float32)
@@ -58,53 +58,43 @@ def test_the_next_images_are_looked_at_while_a_frame_is_worked_on():
 
 
 def test_an_image_that_scans_share_is_looked_at_once():
-    report, calls = LookReport(), []
+    calls = []
 
     def look(image):
         calls.append(image.stamp_ns)
         return answer(image)
 
     frames = [frame(k * 25, k // 4 * 100) for k in range(12)]
-    assert shown(look_ahead(frames, look, report=report)) == [0] * 4 + [100] * 4 + [200] * 4
+    assert shown(look_ahead(frames, look)) == [0] * 4 + [100] * 4 + [200] * 4
     assert len(calls) == 3
-    assert report == LookReport(looked=3)
 
 
 @pytest.mark.parametrize(("rate_hz", "expected"), [(5, 2), (10 / 3, 3), (2.5, 4), (1, 10), (10, 1), (100, 1)])
 def test_images_are_skipped_by_rate_also_when_their_stamps_jitter(rate_hz, expected):
     rng = np.random.default_rng(3)
     stamps = (np.arange(40) * 100 + rng.integers(-8, 9, size=40) + 500).tolist()
-    report = LookReport()
-    found = shown(look_ahead([frame(t, t) for t in stamps], answer, rate_hz=rate_hz, report=report))
+    found = shown(look_ahead([frame(t, t) for t in stamps], answer, rate_hz=rate_hz))
     assert [k for k, what in enumerate(found) if what is not None] == list(range(0, 40, expected))
-    assert report.looked + report.by_rate == 40
 
 
 def test_images_are_skipped_when_they_are_not_needed_and_that_costs_no_slot():
-    report = LookReport()
     frames = [frame(k * 100, k * 100) for k in range(6)]
-    needed = look_ahead(frames, answer, rate_hz=5, is_needed=lambda f: f.stamp_ns >= 10**8, report=report)
+    needed = look_ahead(frames, answer, rate_hz=5, is_needed=lambda f: f.stamp_ns >= 10**8)
     assert shown(needed) == [None, 100, None, 300, None, 500]
-    assert report == LookReport(looked=3, by_rate=2, by_need=1)
 
 
 def test_an_image_that_the_next_scan_needs_is_looked_at_after_all():
-    report = LookReport()
     frames = [frame(0, 0), frame(25, 0), frame(50, 0)]
-    assert shown(look_ahead(frames, answer, is_needed=lambda f: f.stamp_ns > 0, report=report)) == [None, 0, 0]
-    assert report == LookReport(looked=1)
+    assert shown(look_ahead(frames, answer, is_needed=lambda f: f.stamp_ns > 0)) == [None, 0, 0]
 
 
-def test_without_an_image_and_unreadable_ones_are_counted():
-    report = LookReport()
+def test_frames_without_an_image_or_with_an_unreadable_one_have_none():
     frames = [frame(0, None), frame(100, 100), frame(110, 100), frame(200, 200)]
 
     def look(image):
         return None if image.stamp_ns == 10**8 else answer(image)
 
-    assert shown(look_ahead(frames, look, report=report)) == [None, None, None, 200]
-    assert report == LookReport(looked=1, unreadable=1, without_image=1)
-    assert report.lines() == ["1 images segmented", "1 images that could not be read", "1 scans without an image"]
+    assert shown(look_ahead(frames, look)) == [None, None, None, 200]
 
 
 def test_an_error_of_the_thread_reaches_the_caller():
@@ -124,12 +114,11 @@ def test_leaving_early_ends_the_thread():
 
 
 def test_each_camera_has_its_own_images_and_rate():
-    report, frames = LookReport(), []
+    frames = []
     for k in range(6):
         both = view("/left", k * 100), view("/right", k // 2 * 200)
         frames.append(replace(frame(k * 100, None), views=both))
-    found = list(look_ahead(frames, answer, rate_hz=5, report=report))
+    found = list(look_ahead(frames, answer, rate_hz=5))
     assert [[(s.topic, s.stamp_ns // 10**6) for s in seen] for _, seen in found] == [
         [*([("/left", k * 100)] if k % 2 == 0 else []), ("/right", k // 2 * 200)] for k in range(6)
     ]
-    assert report == LookReport(looked=6, by_rate=3)

@@ -181,13 +181,10 @@ def _checked(log: Log, topic: str, calibration: Calibration, path: Path, *, allo
     """The camera of a topic, whose images are as large as its calibration and its camera_info say.
 
     Raises:
-        CalibrationError: they are not. LogError: the first image cannot be read.
+        CalibrationError: they are not. LogError: none of the first images can be read.
     """
     first = log.first(topic, _FIRST)
-    if not first or not isinstance(first[0].value, CameraImage):
-        raise LogError(f"the topic {topic} holds no readable image", where=log.name, hint="choose another --camera")
-    image = first[0].value
-    height, width = (ids_from_png(image) if topic.startswith(ORACLE) else pixels_from_image(image)).shape[:2]
+    image, (height, width) = _first_readable(log, topic, first)
     camera, notes = calibration.camera, _doubts(calibration, path)
     if (width, height) != (camera.width, camera.height):
         message = f"is for images of {camera.width} x {camera.height}, those of {topic} have {width} x {height}"
@@ -199,6 +196,21 @@ def _checked(log: Log, topic: str, calibration: Calibration, path: Path, *, allo
         notes += _compared(info, calibration, (width, height), topic, path, allow_unverified=allow_unverified)
     return Camera(
         _name_of(topic), topic, pictures[0] if pictures else "", calibration, path, tuple(notes), _interval_s(first)
+    )
+
+
+def _first_readable(log: Log, topic: str, messages: Sequence[Message]) -> tuple[CameraImage, tuple[int, int]]:
+    """An image, and its height and width; a recording may begin with a damaged one."""
+    why = "there is none"
+    for image in (message.value for message in messages if isinstance(message.value, CameraImage)):
+        try:
+            pixels = ids_from_png(image) if topic.startswith(ORACLE) else pixels_from_image(image)
+        except LogError as error:
+            why = error.message
+        else:
+            return image, (pixels.shape[0], pixels.shape[1])
+    raise LogError(
+        f"the topic {topic} begins with no readable image: {why}", where=log.name, hint="choose another --camera"
     )
 
 

@@ -38,10 +38,10 @@ from wallkit.pipelines.maps import LoadedMap, load_map
 from wallkit.pipelines.need import UpdatesAhead
 from wallkit.pipelines.recorder import MessageWriter, Recorder
 from wallkit.pipelines.shared import Shared
-from wallkit.pipelines.sight import Sight, sight_of
+from wallkit.pipelines.sight import Sight, reason_of, sight_of
 from wallkit.pipelines.start import check_on_map, find_start
 from wallkit.pipelines.watch import Filtering, Moment, Watch
-from wallkit.points.filters import WITH_CAMERA, apply_filters
+from wallkit.points.filters import apply_filters
 from wallkit.points.labels import labelled_scan, thinned
 from wallkit.report.data import Snapshot
 
@@ -179,6 +179,7 @@ def localize(
     p, timers, mark = prepared, Timers(), mark or mark_now()
     with timers.phase("prepare"):
         tracker, filters = _tracker(p), p.config.points.on(p.map.fields)
+        of_lidar = p.config.points.without_camera().on(p.map.fields)
     rng = np.random.default_rng(np.random.SeedSequence(p.request.seed))
     belief: Any = tracker.start(rng, p.start)  # type: ignore[arg-type]  # _tracker refuses a spread for the EKF
     sync, recorder = SyncReport(), Recorder()
@@ -200,7 +201,8 @@ def localize(
                     frame = thinned(frame, p.config.points.look.returns)
                     seen = p.sight.labels_of(frame, sights)
                     scan = labelled_scan(replace(frame, labels=seen.labels))
-                scan = apply_filters(filters, scan, belief.estimate())
+                has_given_up = p.sight is not None and p.sight.given_up
+                scan = apply_filters(of_lidar if has_given_up else filters, scan, belief.estimate())
                 belief, info = tracker.update(rng, belief, scan)
                 elapsed_ms = (time.perf_counter_ns() - began) / 1e6
             estimate = belief.estimate(frame.stamp_ns)
@@ -253,9 +255,7 @@ def _find_sight(
     except WallkitError as error:
         if not request.cameras.may_fall_back:
             raise
-        left = tuple(name for name in config.points.filters if name not in WITH_CAMERA)
-        reason = f"{error.where}: {error.message}" if error.where else error.message
-        return None, replace(config, points=replace(config.points, filters=left)), reason
+        return None, replace(config, points=config.points.without_camera()), reason_of(error)
     return sight, config, ""
 
 

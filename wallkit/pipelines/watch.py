@@ -29,7 +29,8 @@ class Filtering:
         updates: of the filter. few, one_sided: those with too few kept returns, or kept returns that hold one direction.
         returns, kept: over all updates. passed_over: returns that were not looked up, beside those.
         by_class: class -> (returns, kept).
-        images: looked at for updates. without_image: updates that no image belonged to.
+        images: looked at for updates. without_image: updates that no image could be used for.
+        silent: (camera, why it said nothing) -> updates.
         segment_ms: mean of decoding and segmenting per update; None without a camera.
         notes: what else a reader of the numbers should know, a sentence each.
     """
@@ -46,6 +47,7 @@ class Filtering:
     by_class: dict[str, tuple[int, int]]
     images: int
     without_image: int
+    silent: dict[tuple[str, str], int]
     segment_ms: float | None
     notes: tuple[str, ...] = ()
 
@@ -71,7 +73,10 @@ class Filtering:
                     "unseen_share", self.unseen * of_returns, "share", "share of the returns that no camera labels", ""
                 ),
                 Value(
-                    "updates_without_image", float(self.without_image), "updates", "updates that no image belongs to"
+                    "updates_without_image",
+                    float(self.without_image),
+                    "updates",
+                    "updates that no image could be used for",
                 ),
                 Value("segment_mean_ms", self.segment_ms, "ms", "mean time of decoding and segmenting per update"),
             ]
@@ -92,8 +97,7 @@ class Filtering:
             found.append(f"too few returns were kept at {self.few} of {self.updates} updates")
         if self.one_sided:
             found.append(f"the kept returns hold one direction only at {self.one_sided} of {self.updates} updates")
-        if self.without_image:
-            found.append(f"{self.without_image} of {self.updates} updates had no image")
+        found += [f"{camera}: {why} at {n} of {self.updates} updates" for (camera, why), n in self.silent.items()]
         return [*found, *self.notes]
 
     def document(self) -> dict[str, Any]:
@@ -105,12 +109,13 @@ class Filtering:
             "cameras": list(self.cameras),
             "images": self.images,
             "classes": classes,
+            "silent": [{"camera": camera, "why": why, "updates": n} for (camera, why), n in self.silent.items()],
             "said": self.lines(),
         }
 
 
 # for the keys and definitions of its values
-NO_FILTERING = Filtering((), "", (), 0, 0, 0, 0, 0, 0, {}, 0, 0, 0.0)
+NO_FILTERING = Filtering((), "", (), 0, 0, 0, 0, 0, 0, {}, 0, 0, {}, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +147,7 @@ class Watch:
         self._points, self._sight, self._wanted = points, sight, moments
         self._returns: Counter[str] = Counter()
         self._kept: Counter[str] = Counter()
+        self._silent: Counter[tuple[str, str]] = Counter()
         self._updates = self._few = self._one_sided = self._images = self._without_image = 0
         self._passed_over = 0
         self._cost_ms = 0.0
@@ -167,6 +173,7 @@ class Watch:
         self._cost_ms += seen.cost_ms
         self._without_image += seen.labels is None
         self._images += len(seen.glances)
+        self._silent.update(seen.silent.items())
         if seen.glances and self._wanted:
             self._keep(frame, scan, seen.glances)
 
@@ -186,9 +193,16 @@ class Watch:
             {name: (n, self._kept[name]) for name, n in self._returns.items() if n},
             self._images,
             self._without_image,
+            dict(self._silent),
             self._cost_ms / max(self._updates, 1) if self._sight else None,
-            tuple(self._sight.cache.lines()) if self._sight and self._sight.cache else (),
+            self._notes(),
         )
+
+    def _notes(self) -> tuple[str, ...]:
+        if self._sight is None:
+            return ()
+        given_up = f"the LiDAR alone was used from then on: {self._sight.given_up}" if self._sight.given_up else ""
+        return *((given_up,) if given_up else ()), *(self._sight.cache.lines() if self._sight.cache else ())
 
     def moments(self) -> tuple[Moment, ...]:
         """As many as are wanted, if there were as many."""

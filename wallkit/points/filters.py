@@ -108,6 +108,14 @@ class PointsSettings:
         """Whether one of the chosen filters looks at images."""
         return any(name in WITH_CAMERA for name in self.filters)
 
+    def wanted(self, name: str) -> tuple[str, ...]:
+        """Classes of which a filter needs one at least, or it does nothing good; none: any will do."""
+        return {"wall_mask": self.wall_mask.keep, "reject_dynamic": self.reject_dynamic.reject}.get(name, ())
+
+    def without_camera(self) -> PointsSettings:
+        """The same with the filters of the LiDAR alone."""
+        return replace(self, filters=tuple(name for name in self.filters if name not in WITH_CAMERA))
+
     def on(self, fields: FieldSet) -> tuple[BoundFilter, ...]:
         """The chosen filters on one map."""
         return tuple(getattr(self, name).on(fields) for name in self.filters)

@@ -11,6 +11,9 @@ from numba import njit
 from wallkit.core.config import setting
 from wallkit.core.types import LabelledScan
 
+# returns so near to each other are taken for one surface
+_REACH_M = 0.5
+
 
 @dataclass(frozen=True)
 class KeptSettings:
@@ -30,7 +33,7 @@ class Kept:
     Attributes:
         returns: there were. kept: of weight enough.
         share_across: how much of the kept surfaces' normals is across their main direction, in [0, 0.5]: 0 along one
-            straight wall, 0.5 in a corner.
+            straight wall, 0.5 in a corner; NaN where no two are near each other, so that nobody can tell.
     """
 
     returns: int
@@ -53,20 +56,25 @@ def kept_of(scan: LabelledScan, settings: KeptSettings) -> Kept:
 
 @njit(cache=True, nogil=True)
 def _share_across(xyz: Any, order: Any) -> Any:
-    """Smaller eigenvalue over the sum of both, of the scatter of normals between returns five apart on one surface.
+    """Smaller eigenvalue over the sum of both, of the scatter of normals between returns on one surface; NaN without any.
+
+    A surface's direction is that from the farthest return within half a metre before, and counts by its length squared:
+    noise turns short ones.
 
     order: places of the returns in xyz, as they lie beside each other.
     """
     xx, xy, yy = 0.0, 0.0, 0.0
-    for n in range(5, len(order)):
-        k, before = order[n], order[n - 5]
-        dx, dy = xyz[k, 0] - xyz[before, 0], xyz[k, 1] - xyz[before, 1]
-        square = dx * dx + dy * dy
-        if 0 < square < 0.25:
-            xx += dx * dx / square
-            xy += dx * dy / square
-            yy += dy * dy / square
+    before = 0
+    for n in range(1, len(order)):
+        while before < n:
+            dx, dy = xyz[order[n], 0] - xyz[order[before], 0], xyz[order[n], 1] - xyz[order[before], 1]
+            if dx * dx + dy * dy < _REACH_M * _REACH_M:
+                xx += dx * dx
+                xy += dx * dy
+                yy += dy * dy
+                break
+            before += 1
     total = xx + yy
     if total == 0:
-        return 0.0
+        return np.nan
     return 0.5 - 0.5 * np.sqrt((xx - yy) ** 2 + 4 * xy * xy) / total

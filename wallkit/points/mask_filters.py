@@ -15,6 +15,7 @@ from numba import njit
 
 from wallkit.core.config import setting
 from wallkit.core.types import Estimate, FieldSet, Float32Array, LabelledScan
+from wallkit.errors import closest
 
 if TYPE_CHECKING:
     from wallkit.points.filters import BoundFilter
@@ -35,6 +36,9 @@ class WallMask:
     )
     unseen_weight: float = setting(1.0, "weight of a return that no camera sees", low=0, high=1)
 
+    def __post_init__(self) -> None:
+        _check_known(self.keep, "keep")
+
     def on(self, fields: FieldSet) -> BoundFilter:
         """See PointFilter."""
         return self
@@ -54,6 +58,9 @@ class RejectDynamic:
 
     reject: tuple[str, ...] = setting(("person", "movable"), "classes that are rejected")
     unseen_weight: float = setting(1.0, "weight of a return that no camera sees", low=0, high=1)
+
+    def __post_init__(self) -> None:
+        _check_known(self.reject, "reject")
 
     def on(self, fields: FieldSet) -> BoundFilter:
         """See PointFilter."""
@@ -104,6 +111,13 @@ class SoftMask:
     def classes() -> tuple[str, ...]:
         """That have a prior of their own."""
         return tuple(f.name for f in fields(SoftMask) if f.name != "unseen_weight")
+
+
+def _check_known(names: tuple[str, ...], setting_name: str) -> None:
+    """Refuse a word that no class of any model counts as."""
+    for name in names:
+        if name not in SoftMask.classes():
+            raise ValueError(f"{setting_name}: '{name}' is no class; {closest(name, SoftMask.classes())}")
 
 
 def _between(

@@ -29,33 +29,6 @@ class Seen:
     segmentation: Segmentation
 
 
-@dataclass
-class LookReport:
-    """What became of the images that frames brought along, each counted once.
-
-    Attributes:
-        looked: segmented. by_rate, by_need: skipped. unreadable: could not be decoded.
-        without_image: frames that had none.
-    """
-
-    looked: int = 0
-    by_rate: int = 0
-    by_need: int = 0
-    unreadable: int = 0
-    without_image: int = 0
-
-    def lines(self) -> list[str]:
-        """One sentence for each kind that happened."""
-        said = (
-            (self.looked, "images segmented"),
-            (self.by_rate, "images skipped by segment.rate_hz"),
-            (self.by_need, "images skipped: not needed"),
-            (self.unreadable, "images that could not be read"),
-            (self.without_image, "scans without an image"),
-        )
-        return [f"{count} {words}" for count, words in said if count]
-
-
 def look_ahead(
     frames: Iterable[Frame],
     look: Look,
@@ -63,7 +36,6 @@ def look_ahead(
     rate_hz: float = 0.0,
     is_needed: Needed = lambda _: True,
     frames_ahead: int = 2,
-    report: LookReport | None = None,
 ) -> Iterator[tuple[Frame, tuple[Seen, ...]]]:
     """Each frame with what its images show, of each camera one; without those that are skipped.
 
@@ -71,18 +43,15 @@ def look_ahead(
         look: decodes and segments an image, None when it cannot be decoded; called from one other thread only.
         rate_hz: images per second of stamps at most, of each camera; 0: all.
         is_needed: asked, in the caller's thread, when a frame is read, which is `frames_ahead` before it is handed out.
-        report: filled on the way.
     """
-    report = report if report is not None else LookReport()
     cameras: dict[str, _Ahead] = {}
     waiting: deque[tuple[Frame, list[tuple[_Ahead, _Job]]]] = deque()
     with ThreadPoolExecutor(max_workers=1, thread_name_prefix="segment") as pool:
         try:
             for frame in frames:
-                report.without_image += not frame.views
                 jobs = []
                 for view in frame.views:
-                    camera = cameras.setdefault(view.topic, _Ahead(view.topic, look, rate_hz, report))
+                    camera = cameras.setdefault(view.topic, _Ahead(view.topic, look, rate_hz))
                     job = camera.job(frame, view.image, is_needed, pool)
                     jobs += [(camera, job)] if job is not None else []
                 waiting.append((frame, jobs))
@@ -108,31 +77,24 @@ def _done(frame: Frame, jobs: list[tuple[_Ahead, _Job]]) -> tuple[Frame, tuple[S
 class _Ahead:
     """The image of one camera that was looked at last, and when the next one is due."""
 
-    def __init__(self, topic: str, look: Look, rate_hz: float, report: LookReport) -> None:
-        self._topic, self._look, self._report = topic, look, report
+    def __init__(self, topic: str, look: Look, rate_hz: float) -> None:
+        self._topic, self._look = topic, look
         self._period_ns = 1e9 / rate_hz if rate_hz > 0 else 0.0
         self._image_ns: int | None = None
         self._job: _Job | None = None
         self._interval_ns = 0
         self._due_ns = -math.inf
-        self._unreadable_ns: int | None = None
 
     def job(self, frame: Frame, image: CameraImage, is_needed: Needed, pool: ThreadPoolExecutor) -> _Job | None:
         """The look at a frame's image, begun now or before; None where there is none."""
-        is_new = self._image_ns != image.stamp_ns
-        if is_new:
+        if self._image_ns != image.stamp_ns:
             before_ns = image.stamp_ns if self._image_ns is None else self._image_ns
             self._image_ns, self._job, self._interval_ns = image.stamp_ns, None, max(image.stamp_ns - before_ns, 0)
         if self._job is not None:
             return self._job
-        if image.stamp_ns + self._interval_ns / 2 < self._due_ns:
-            self._report.by_rate += is_new
-        elif not is_needed(frame):
-            self._report.by_need += is_new
-        else:
-            # a scan before may have had no need of it
-            self._report.by_need -= not is_new
-            self._report.looked += 1
+        is_due = image.stamp_ns + self._interval_ns / 2 >= self._due_ns
+        # a scan before may have had no need of it
+        if is_due and is_needed(frame):
             self._set_due(image.stamp_ns)
             self._job = image.stamp_ns, pool.submit(self._look, image)
         return self._job
@@ -141,13 +103,7 @@ class _Ahead:
         """What was seen, as soon as that is known; None where the image cannot be read."""
         stamp_ns, future = job
         found = future.result()
-        if found is not None:
-            return Seen(self._topic, stamp_ns, found)
-        if stamp_ns != self._unreadable_ns:
-            self._report.looked -= 1
-            self._report.unreadable += 1
-            self._unreadable_ns = stamp_ns
-        return None
+        return None if found is None else Seen(self._topic, stamp_ns, found)
 
     def _set_due(self, stamp_ns: int) -> None:
         """The next moment on the beat of the first image; the image nearest to it is the one."""
