@@ -33,7 +33,7 @@ class SegmentSettings:
         (0.0, 0.0, 0.0), "subtracted from R, G, B in [0, 1], for a model whose metadata does not say"
     )
     std: tuple[float, float, float] = setting((1.0, 1.0, 1.0), "what R, G, B are divided by after that")
-    roles: Roles = section(Roles, "which class names count as what; all else is `other`")
+    roles: Roles = section(Roles, "what your own class names count as, before the common ones; all else is `other`")
 
     def __post_init__(self) -> None:
         if not all(value > 0 for value in self.std):
