@@ -16,7 +16,9 @@ USERS = "user"
 class SegmentSettings:
     """How a model is run and read."""
 
-    model: str = setting("", "ONNX file used when --model is not given; relative to this file")
+    model: str = setting(
+        "", 'used when --model is not given: an ONNX file, relative to this file; "default" (also if empty) or "oracle"'
+    )
     min_score: float = setting(0.25, "detections of YOLO models that are less sure are not used", low=0, high=1)
     max_overlap: float = setting(
         0.7, "of two detections of a class that overlap more (IoU of boxes), the less sure goes", low=0, high=1
