@@ -135,3 +135,24 @@ def test_a_users_own_part_is_named_by_module():
     assert name_in({}, Square()) == f"{__name__}:Square"
     with pytest.raises(ConfigError, match="cannot load shape"):
         pick({}, "no.such.module:Thing", what="shape")
+
+
+@dataclass(frozen=True)
+class Even:
+    count: int = setting(2, "how many")
+
+    def __post_init__(self):
+        if self.count % 2:
+            raise ConfigError(f"{self.count} is odd", hint=f"{self.count + 1}")
+
+
+@dataclass(frozen=True)
+class Pairs:
+    even: Even = section(Even, "pairs")
+
+
+def test_what_a_table_says_against_itself_is_told_with_its_place_and_hint(tmp_path):
+    with pytest.raises(ConfigError, match="3 is odd") as caught:
+        build(Pairs, [source("[even]\ncount = 3\n", tmp_path)])
+    assert caught.value.where.endswith("wallkit.toml:2")
+    assert caught.value.hint == "4"

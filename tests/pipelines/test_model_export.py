@@ -131,6 +131,23 @@ def test_the_input_fits_the_camera(tmp_path, camera, size):
     assert size_for_camera(path) == size
 
 
+@pytest.mark.parametrize("by", ["--python", "WALLKIT_YOLO_PYTHON"])
+def test_an_interpreter_named_from_here_runs_in_another_folder_by_its_own_name(tmp_path, asked, monkeypatch, by):
+    """A virtual environment is known by the link that its interpreter is started by."""
+    stand_in = asked().python
+    link = tmp_path / "yv/bin/python"
+    link.parent.mkdir(parents=True)
+    link.symlink_to(stand_in)
+    monkeypatch.chdir(tmp_path)
+    relative = Path("yv/bin/python")
+    if by == "WALLKIT_YOLO_PYTHON":
+        monkeypatch.setenv(by, str(relative))
+    named = relative if by == "--python" else None
+    assert find_interpreter(named).python == link
+    export_model(asked(python=named), SegmentSettings())
+    assert (tmp_path / "out.onnx").is_file()
+
+
 def test_the_interpreter_is_found_by_variable_or_by_yolos_first_line(tmp_path, monkeypatch):
     monkeypatch.setenv("WALLKIT_YOLO_PYTHON", "/bin/sh")
     assert find_interpreter(None).python == Path("/bin/sh")

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wallkit.core.segmentation import BACKGROUND
 from wallkit.segment.class_map import class_map
-from wallkit.segment.roles import Roles
 
 NAMES = ("floor", "Wall-Tile", "windowpane", "robot", "person")
 
@@ -21,17 +19,6 @@ def drawn():
     ids[30:60, 50:60] = 4
     ids[:5] = 255
     return class_map(ids, NAMES, nothing=255)
-
-
-def test_roles_forgive_spelling_and_call_the_rest_other():
-    assert Roles().of(("Wall_Tile", "WALL", "windowpane", "person", "robot", BACKGROUND)) == (
-        *("wall", "wall", "glass", "person", "other"),
-        BACKGROUND,
-    )
-
-
-def test_a_role_of_the_users_own_beats_the_usual_one():
-    assert Roles(wall=("robot",), person=("robot",)).of(("robot", "wall")) == ("wall", "other")
 
 
 def test_look_up_mask_and_labels_agree_at_every_pixel(drawn):

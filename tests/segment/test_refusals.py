@@ -65,12 +65,23 @@ def test_outputs_that_are_no_segmentation(tmp_path, case):
         (([1, 1, 64, 64], 1), "1 channels, not 3"),
         (([1, 3, 64, 64], 2), "uint8, not float"),
         (([1, 3, 64], 1), "no picture"),
+        (([4, 3, 64, 64], 1), r"input \[4, 3, 64, 64\] wants 4 pictures at once"),
     ],
 )
 def test_inputs_that_are_no_picture(tmp_path, given, words):
     path = constant_model(tmp_path / "m.onnx", {"scores": np.zeros((1, 2, 8, 8), F)}, metadata=NAMES, given=given)
     with pytest.raises(ModelError, match=words):
         load_segmenter(path)
+
+
+def test_a_model_of_several_pictures_at_once_is_to_be_exported_again_and_an_open_number_is_one(tmp_path):
+    outputs = {"s": np.zeros((1, 2, 8, 8), F)}
+    with pytest.raises(ModelError) as caught:
+        load_segmenter(constant_model(tmp_path / "m.onnx", outputs, metadata=NAMES, given=([4, 3, 64, 64], 1)))
+    assert caught.value.hint == "export it with batch 1"
+    for batch in (1, "batch", -1):
+        path = constant_model(tmp_path / "m.onnx", outputs, metadata=NAMES, given=([batch, 3, 64, 64], 1))
+        assert load_segmenter(path).segment(picture((64, 64), {})).shape == (64, 64)
 
 
 def test_a_file_that_is_not_there_a_checkpoint_and_damaged_ones(tmp_path):

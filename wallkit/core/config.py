@@ -243,10 +243,12 @@ def _build(
             origins[".".join(here)] = source.place(here)
         else:
             origins[".".join(here)] = "default"
+    where = next((s.place(key) for s, _ in reversed(sources)), "")
     try:
         return cls(**values)
+    except ConfigError as error:
+        raise ConfigError(error.message, where=error.where or where, hint=error.hint) from error
     except ValueError as error:
-        where = next((s.place(key) for s, _ in reversed(sources)), "")
         raise ConfigError(str(error), where=where, hint=f"see `wallkit config show` for [{'.'.join(key)}]") from error
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,6 +24,8 @@ from wallkit.points.project import check_usable
 ORACLE_MODEL = "oracle"
 # images that tell how often they come
 _FIRST = 12
+# what ROS' image_transport appends to the topic of the same images
+_COMPRESSED = "/compressed"
 # intrinsics that differ more are of another camera or mode
 _SAME_FOCAL = 0.02
 
@@ -152,25 +154,56 @@ def _image_topics(log: Log, *, is_oracle: bool) -> tuple[str, ...]:
 
 
 def _topic_of(log: Log, known: Sequence[str], calibration: Calibration, path: Path, name: str, *, alone: bool) -> str:
-    """The topic of a calibration's camera: the one named, else the one of its frame or name, else the only one."""
+    """The topic of a calibration's camera: the one named, else the one of its frame or name, else the only one.
+
+    Raises:
+        LogError: nothing, or more than one thing, is called so. CalibrationError: its camera is not in the log.
+    """
+    if exact := [t for t in known if name in (t, t.lstrip("/"))]:
+        return exact[0]
+    frames = {topic: message.value.frame_id for topic in known for message in log.first(topic)
+              if isinstance(message.value, CameraImage)}  # fmt: skip
+    topics = [t for t in known if not _is_copy(t, frames)]
     if name:
-        found = [t for t in known if name in (t, t.lstrip("/"), _name_of(t))]
+        found = [t for t in topics if _name_of(t) == name]
         if not found:
             hint = closest(name, [*known, *(_name_of(t) for t in known)])
             raise LogError(f"no camera '{name}' whose images can be used", where=log.name, hint=hint)
-        return found[0]
-    frames = {topic: message.value.frame_id for topic in known for message in log.first(topic)
-              if isinstance(message.value, CameraImage)}  # fmt: skip
+        return _only(found, log, f"of a camera '{name}'", frames)
     camera = calibration.camera
-    found = [t for t in known if camera.frame and frames.get(t) == camera.frame]
-    found = found or [t for t in known if camera.name and _name_of(t) == camera.name]
+    said = f"the camera of this calibration ('{camera.name}', frame '{camera.frame}')"
+    found = [t for t in topics if camera.frame and frames.get(t) == camera.frame]
+    found = found or [t for t in topics if camera.name and _name_of(t) == camera.name]
+    if found:
+        return _only(found, log, f"of {said}", frames)
+    if len(topics) == 1 and alone and not (camera.frame and frames.get(topics[0], camera.frame) != camera.frame):
+        return topics[0]
+    listed = ", ".join(f"{_name_of(t)} ({t}, frame {frames.get(t) or '(none)'})" for t in topics)
+    hint = f"say which it is, for example --camera {_name_of(topics[0])}"
+    raise CalibrationError(f"{said} is not in the log: {listed}", where=path, hint=hint)
+
+
+def _is_copy(topic: str, frames: Mapping[str, str]) -> bool:
+    """Whether another topic has the same pixels: the raw one of its own, or the compressed one if there are no raw ones.
+
+    Args:
+        frames: of the topics that hold images.
+    """
+    raw = topic.removesuffix(_COMPRESSED)
+    return raw in frames if raw != topic else topic not in frames and topic + _COMPRESSED in frames
+
+
+def _only(found: Sequence[str], log: Log, whose: str, frames: Mapping[str, str]) -> str:
+    """The one topic that was found; of several, such as raw and rectified images, nobody can tell which was calibrated.
+
+    Raises:
+        LogError: there are several.
+    """
     if len(found) == 1:
         return found[0]
-    if len(known) == 1 and alone and not (camera.frame and frames.get(known[0], camera.frame) != camera.frame):
-        return known[0]
-    listed = ", ".join(f"{_name_of(t)} ({t}, frame {frames.get(t) or '(none)'})" for t in known)
-    message = f"the camera of this calibration ('{camera.name}', frame '{camera.frame}') is not in the log: {listed}"
-    raise CalibrationError(message, where=path, hint=f"say which it is, for example --camera {_name_of(known[0])}")
+    lines = "".join(f"\n    {topic}  frame {frames.get(topic) or '(none)'}" for topic in found)
+    hint = f"name the whole topic that was calibrated, for example --camera {found[0]}"
+    raise LogError(f"{len(found)} topics have images {whose}:{lines}", where=log.name, hint=hint)
 
 
 def _name_of(topic: str) -> str:

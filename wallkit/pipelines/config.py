@@ -14,9 +14,11 @@ from wallkit.logs.sync import SyncConfig
 from wallkit.maps.audit.settings import AuditSettings
 from wallkit.maps.grids.fields import MapsSettings
 from wallkit.maps.rules.tolerances import Tolerances
+from wallkit.pipelines.cameras import ORACLE_MODEL
 from wallkit.pipelines.evaluate import EvaluateSettings
 from wallkit.pipelines.recorder import ResultSettings
 from wallkit.points.filters import PointsSettings
+from wallkit.segment.default import DEFAULT
 from wallkit.segment.settings import USERS, SegmentSettings
 
 DEFAULT_FILE = Path("wallkit.toml")
@@ -75,14 +77,15 @@ def with_files_beside(source: Source, path: Path) -> Source:
     """The source with its map, model and cache named from here, not from the file's folder."""
     table = _beside(_beside(source.table, "map", path), "ceiling", path)
     if isinstance(table.get("segment"), dict):
-        segment = _beside(table["segment"], "model", path)
-        table = {**table, "segment": segment if segment.get("cache") == USERS else _beside(segment, "cache", path)}
+        segment = _beside(table["segment"], "model", path, but=(DEFAULT, ORACLE_MODEL))
+        table = {**table, "segment": _beside(segment, "cache", path, but=(USERS,))}
     return replace(source, table=table)
 
 
-def _beside(table: Mapping[str, Any], key: str, path: Path) -> dict[str, Any]:
+def _beside(table: Mapping[str, Any], key: str, path: Path, *, but: Sequence[str] = ()) -> dict[str, Any]:
+    """The table with the file under a key named from here; words in `but` are no files."""
     name = table.get(key)
-    if not isinstance(name, str) or not name or Path(name).is_absolute():
+    if not isinstance(name, str) or not name or name in but or Path(name).is_absolute():
         return dict(table)
     return {**table, key: str(path.parent / name)}
 

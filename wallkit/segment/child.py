@@ -46,10 +46,12 @@ def find_interpreter(named: Path | None, *, is_trusting: bool = False) -> Interp
     """
     said = named or (Path(os.environ[VARIABLE]) if os.environ.get(VARIABLE) else None)
     if said is not None:
-        if shutil.which(said) is None:
+        program = shutil.which(said)
+        if program is None:
             where = "--python" if named else VARIABLE
             raise ModelError(f"'{said}' is no program that can be run", where=where, hint="name its bin/python")
-        return Interpreter(said, is_trusting)
+        # it runs in another folder, and without following its link, which would lead out of a virtual environment
+        return Interpreter(Path(os.path.abspath(program)), is_trusting)
     program = shutil.which("yolo")
     python = _shebang(Path(program)) if program else None
     if python is None:

@@ -14,7 +14,7 @@ from wallkit.segment.detections import Detections, detections_from_anchors, dete
 from wallkit.segment.instances import Instances
 from wallkit.segment.letterbox import Letterbox
 from wallkit.segment.model_file import ModelFile, Tensor
-from wallkit.segment.refusals import refusal
+from wallkit.segment.refusals import input_reason, refusal
 from wallkit.segment.scores import IdMap, ScoreMap
 
 
@@ -66,8 +66,7 @@ def layout_of(model: ModelFile) -> tuple[str, Outputs]:
     Raises:
         ModelError: it keeps none of them, or its names do not fit.
     """
-    given = model.inputs[0] if len(model.inputs) == 1 else None
-    if given is None or len(given.shape) != 4 or given.shape[1] != 3 or given.dtype not in ("float32", "float16"):
+    if input_reason(model):
         raise refusal(model)
     found = [(name, outputs) for name, layout in LAYOUTS.items() if (outputs := layout.find(model))]
     if not found:

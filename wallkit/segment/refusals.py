@@ -20,12 +20,13 @@ _TASKS = {
 
 def refusal(model: ModelFile, *, room: int | None = None) -> ModelError:
     """What to say of a model that keeps no layout; or one that does, but has `room` for another number of classes."""
-    message, hint = _input_reason(model) or _output_reason(model) or _names_reason(model, room)
+    message, hint = input_reason(model) or _output_reason(model) or _names_reason(model, room)
     given = "; ".join([*(f"input {t}" for t in model.inputs), *(f"output {t}" for t in model.outputs)])
     return ModelError(f"{message} ({given})", where=model.path, hint=hint)
 
 
-def _input_reason(model: ModelFile) -> tuple[str, str] | None:
+def input_reason(model: ModelFile) -> tuple[str, str] | None:
+    """Why a model's input is not one picture in RGB, and what to do; None if it is."""
     if len(model.inputs) != 1:
         return f"it has {len(model.inputs)} inputs, not one picture", _WANTED
     given = model.inputs[0]
@@ -37,6 +38,8 @@ def _input_reason(model: ModelFile) -> tuple[str, str] | None:
         return f"its input has {given.shape[1]} channels, not 3", _WANTED
     if given.dtype not in ("float32", "float16"):
         return f"its input is {given.dtype}, not float", "export it for RGB from 0 to 1, without preprocessing inside"
+    if given.shape[0] not in (None, 1):
+        return f"its input {shape_words(given.shape)} wants {given.shape[0]} pictures at once", "export it with batch 1"
     return None
 
 

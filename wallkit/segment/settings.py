@@ -16,7 +16,9 @@ USERS = "user"
 class SegmentSettings:
     """How a model is run and read."""
 
-    model: str = setting("", "ONNX file used when --model is not given; relative to this file")
+    model: str = setting(
+        "", 'used when --model is not given: an ONNX file, relative to this file; "default" (also if empty) or "oracle"'
+    )
     min_score: float = setting(0.25, "detections of YOLO models that are less sure are not used", low=0, high=1)
     max_overlap: float = setting(
         0.7, "of two detections of a class that overlap more (IoU of boxes), the less sure goes", low=0, high=1
@@ -33,7 +35,7 @@ class SegmentSettings:
         (0.0, 0.0, 0.0), "subtracted from R, G, B in [0, 1], for a model whose metadata does not say"
     )
     std: tuple[float, float, float] = setting((1.0, 1.0, 1.0), "what R, G, B are divided by after that")
-    roles: Roles = section(Roles, "which class names count as what; all else is `other`")
+    roles: Roles = section(Roles, "what your own class names count as, before the common ones; all else is `other`")
 
     def __post_init__(self) -> None:
         if not all(value > 0 for value in self.std):

@@ -42,7 +42,7 @@ def inspect(
     Examples:
       wallkit model inspect best.onnx
       wallkit model inspect best.onnx --require wall,door
-      wallkit model inspect best.onnx --set 'segment.roles.wall=["cladding", "wall"]'
+      wallkit model inspect best.onnx --set 'segment.roles.wall=["cladding", "tiles"]'
     """
     from wallkit.errors import ConfigError, closest
     from wallkit.pipelines.config import load_config
