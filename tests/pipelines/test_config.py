@@ -28,6 +28,8 @@ def test_files_are_beside_their_settings(loaded):
     assert loaded('[segment]\nmodel = "/models/best.onnx"\n').segment.model == "/models/best.onnx"
 
 
-@pytest.mark.parametrize(("key", "word"), [("model", "default"), ("model", "oracle"), ("cache", "user")])
+@pytest.mark.parametrize(
+    ("key", "word"), [("model", "default"), ("model", "oracle"), ("cache", "user"), ("model", "s3://fleet/best.onnx")]
+)
 def test_words_that_name_no_file_stay(loaded, key, word):
     assert getattr(loaded(f'[segment]\n{key} = "{word}"\n').segment, key) == word

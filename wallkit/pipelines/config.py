@@ -83,9 +83,9 @@ def with_files_beside(source: Source, path: Path) -> Source:
 
 
 def _beside(table: Mapping[str, Any], key: str, path: Path, *, but: Sequence[str] = ()) -> dict[str, Any]:
-    """The table with the file under a key named from here; words in `but` are no files."""
+    """The table with the file under a key named from here; words in `but` are no files, nor are addresses."""
     name = table.get(key)
-    if not isinstance(name, str) or not name or name in but or Path(name).is_absolute():
+    if not isinstance(name, str) or not name or name in but or "://" in name or Path(name).is_absolute():
         return dict(table)
     return {**table, key: str(path.parent / name)}
 
