@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import threading
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +20,7 @@ from wallkit.pipelines.cameras import CameraRequest
 from wallkit.pipelines.config import load_config
 from wallkit.pipelines.localize import Request, localize, prepare
 from wallkit.segment.class_map import class_map
+from wallkit.segment.default import model_path
 from wallkit.segment.fixture import USUAL, oracle
 
 ORACLE = {"model": "oracle"}
@@ -59,6 +62,7 @@ def test_the_command_keeps_walls_and_says_so(wallkit, tmp_path, world):
     assert classes["wall"]["kept"] > 0.9 * classes["wall"]["returns"]
     assert classes["not seen"]["kept"] == classes["not seen"]["returns"]
     assert run["filtering"]["cameras"][0]["topic"] == "/oracle/front/classes"
+    assert str(world / "front.toml") in {entry["path"] for entry in run["inputs"]}
     metrics = json.loads((tmp_path / "run" / "metrics.json").read_text())
     assert 0 < metrics["kept_share"] < 1
     assert len(list((tmp_path / "run" / "overlays").glob("*.png"))) == 2
@@ -97,6 +101,16 @@ def test_polygons_keep_what_pixels_keep(world):
     by_pixel = localize(ready(world)).filtering
     by_polygon = localize(ready(world, words=("points.look.lookup=crossing_number",))).filtering
     assert by_polygon.kept == pytest.approx(by_pixel.kept, rel=0.03)
+
+
+def test_the_folder_names_the_model_it_was_run_with_by_its_hash(world, wallkit, tmp_path):
+    words = ("--filter", "wall_mask", "--calib", world / "front.toml", "--init", "truth", "-q", "--particles", "300")
+    for model, file in ((world / "colours.onnx", world / "colours.onnx"), ("default", model_path(Path("default")))):
+        done = wallkit("localize", world / "log.mcap", *words, "--model", model, "--fallback", "lidar", "-o", "run",
+                       "--overwrite", "--end", "2")  # fmt: skip
+        assert done.code in (0, 4), done.err
+        hashes = {entry["sha256"] for entry in json.loads((tmp_path / "run" / "run.json").read_text())["inputs"]}
+        assert hashlib.sha256(file.read_bytes()).hexdigest() in hashes
 
 
 def test_later_seeds_look_at_no_image_and_say_what_a_first_one_says(world):

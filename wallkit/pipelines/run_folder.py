@@ -208,7 +208,7 @@ def _provenance(run: Run, loaded: LoadedConfig) -> dict[str, Any]:
     """run.json: what was run on what, with which settings, and what was dropped."""
     p = run.prepared
     overhead = [] if p.overhead is None else [p.overhead.path]
-    files = _files_of([*p.request.logs, *p.map.files, *overhead])
+    files = _files_of([*p.request.logs, *p.map.files, *overhead, *(p.sight.files if p.sight else ())])
     return {
         "schema": 1,
         "wallkit": wallkit.__version__,

@@ -6,6 +6,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,7 +34,7 @@ from wallkit.points.outlines import classes_by_outlines
 from wallkit.points.perturb import PerturbSettings, perturbed, without_dropped
 from wallkit.segment.ahead import Seen, look_ahead
 from wallkit.segment.cache import SegmentationCache, cache_of
-from wallkit.segment.default import DEFAULT
+from wallkit.segment.default import DEFAULT, model_path
 from wallkit.segment.grown import grown
 
 if TYPE_CHECKING:
@@ -122,6 +123,12 @@ class Sight:
     def __post_init__(self) -> None:
         self.classes = tuple(dict.fromkeys(self.roles))
         self._class_of = np.array([*(self.classes.index(role) for role in self.roles), -1])
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The calibrations, and the model unless the log is asked instead."""
+        model = () if self.model == ORACLE_MODEL else (model_path(Path(self.model)),)
+        return *(camera.source for camera in self.cameras), *model
 
     def ahead(self, frames: Iterable[Frame], is_needed: Callable[[Frame], bool]) -> Iterator[tuple[Frame, Sights]]:
         """Each frame of a run with what its images show, segmented in another thread ahead of the filter."""
@@ -331,8 +338,6 @@ def _oracle(log: Log, settings: SegmentSettings) -> Looks:
 
 
 def _network(model: str, settings: SegmentSettings) -> Looks:
-    from pathlib import Path
-
     from wallkit.segment.onnx_segmenter import load_segmenter
 
     segmenter = load_segmenter(Path(model), settings)
