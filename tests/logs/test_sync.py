@@ -256,6 +256,29 @@ def test_a_cloud_is_sliced_at_the_height_asked_for(tmp_path):
     assert on_walls(pose_at(MOTION, frames[0].stamp_ns), frames[0].points.xyz_m[:, :2]).max() > 0.5
 
 
+def test_the_whole_cloud_is_moved_as_the_slice_of_it_is(tmp_path):
+    """A LiDAR turns once in 0.1 s while the robot drives and turns: all of a frame's cloud is on the walls of the room."""
+
+    def cloud(stamp_ns):
+        scan = sweep(MOTION, stamp_ns, mount=MOUNT, interval_s=0.1 / 360)
+        ring = np.stack([scan.ranges_m * np.cos(scan.angles_rad), scan.ranges_m * np.sin(scan.angles_rad)], axis=-1)
+        rings = [np.column_stack([ring, np.full(360, z)]) for z in (0.3, 0.6, 1.5)]
+        offsets = np.tile(np.arange(360) * (0.1 / 360), 3)
+        return PointCloud(stamp_ns, "laser", np.vstack(rings).astype(np.float32), offsets_s=offsets.astype(np.float32))
+
+    messages = [(m[0], "/points", cloud(m[0])) if m[1] == "/scan" else m for m in DRIVE]
+    messages = sorted([*messages, *images(offset_ns=0, until_s=4.2)], key=lambda m: m[0])
+    frames, _ = frames_of(tmp_path, messages, wanted=CAMERA)
+    assert len(frames) == 20
+    for frame in frames:
+        assert frame.cloud_m.dtype == np.float32
+        # 50 Hz odometry interpolated, as for points
+        assert on_walls(pose_at(MOTION, frame.stamp_ns), frame.cloud_m[:, :2]).max() < 2e-4
+        in_time = np.argsort(frame.points.offsets_s)
+        np.testing.assert_allclose(frame.cloud_m[:360], frame.points.xyz_m[in_time], atol=2e-5)
+        np.testing.assert_allclose(frame.cloud_m[[0, 360, 720], 2], [0.3, 0.6, 1.5], atol=1e-6)
+
+
 @given(st.lists(st.integers(0, 50), min_size=2, max_size=40), st.integers(0, 50), st.integers(0, 50))
 def test_the_buffer_answers_as_if_it_held_everything(stamps, forget, at):
     """Against the plain formula over the whole history."""
