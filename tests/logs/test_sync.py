@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from tests.logs.drawn import SECOND_NS, START_NS, drive, log_of, on_walls, pose_at, sweep, write
 from wallkit.core.types import CameraImage, Odometry, PointCloud, Transform
 from wallkit.errors import LogError
+from wallkit.logs.eyes import Eyes
 from wallkit.logs.odometry import OdometryBuffer
 from wallkit.logs.reader import open_log
 from wallkit.logs.rig import CameraTopic, Wanted, find_rig
@@ -209,6 +210,22 @@ def test_two_cameras_and_a_clock_that_is_ahead(tmp_path):
         np.testing.assert_array_equal(first.odometry, second.odometry)
 
 
+@pytest.mark.parametrize("late_s", [0.0, 0.2, 0.8])
+@pytest.mark.parametrize("rate_hz", [10, 60])
+def test_a_fast_camera_and_sweeps_that_are_recorded_late(tmp_path, rate_hz, late_s):
+    """The image nearest in time is as near as the camera's rate allows, though many came since."""
+    late_ns = round((0.1 + late_s) * SECOND_NS)
+    pictures = images(offset_ns=7_000_000, every_ns=SECOND_NS // rate_hz, until_s=5.2)
+    late = [(s + late_ns if topic == "/scan" else s, topic, value) for s, topic, value in DRIVE]
+    frames, report = frames_of(tmp_path, sorted([*late, *pictures], key=lambda m: m[0]), wanted=CAMERA)
+    assert len(frames) == 20
+    assert report.frames_without_image == 0
+    for frame in frames:
+        middle_ns = frame.stamp_ns + SWEEP_NS // 2
+        nearest_ns = min((s for s, _, _ in pictures), key=lambda s: abs(s - middle_ns))
+        assert frame.views[0].moment_ns == nearest_ns
+
+
 def test_a_camera_that_dies_stops_no_frame(tmp_path):
     pictures = images(offset_ns=0, until_s=1.0)
     messages = sorted([*DRIVE, *pictures], key=lambda m: m[0])
@@ -317,3 +334,22 @@ def test_memory_does_not_grow_with_the_log(tmp_path, monkeypatch):
     frames_of(tmp_path, messages, SyncConfig(lookahead_s=1.0))
     assert len(sizes) == 3000
     assert max(sizes) < 100
+
+
+def test_images_are_held_no_longer_than_a_sweep_may_ask_for_them(tmp_path, monkeypatch):
+    """Of a camera at 100 Hz, with a sweep every 0.2 s: those since a tolerance before the last sweep."""
+    held = []
+    original = Eyes.take
+
+    def watched(self, topic, image):
+        taken = original(self, topic, image)
+        held.append(len(list(self.held)))
+        return taken
+
+    monkeypatch.setattr(Eyes, "take", watched)
+    pictures = images(offset_ns=0, every_ns=SECOND_NS // 100, until_s=4.2)
+    frames_of(tmp_path, sorted([*DRIVE, *pictures], key=lambda m: m[0]), wanted=CAMERA)
+    assert len(held) == 420
+    assert max(held[:380]) <= 20 + 6 + 1
+    # nothing asks any more: a second and the tolerance
+    assert max(held) <= 106 + 2

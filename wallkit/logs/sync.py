@@ -1,8 +1,8 @@
 """Messages of a log -> frames for the filter: one for each sweep, with odometry and images at the sweep's header stamp.
 
 Only header stamps are compared. Record time, which may be days off, says just one thing: how long a sweep has waited for
-messages that were recorded after it. Memory holds the sweeps that wait, the odometry since the oldest of them, and a few
-images, never the log.
+messages that were recorded after it. Memory holds the sweeps that wait, the odometry since the oldest of them, and a second
+of images at most, never the log.
 """
 
 from __future__ import annotations
@@ -209,6 +209,8 @@ class _Synchroniser:
             waiting = _Waiting(scan, log_ns, sweep_span(scan), cloud)
             for image in self._eyes.held:
                 self._eyes.offer(waiting.images, waiting.middle_ns, image)
+            # the next sweep is later than this one, and so is its middle than this one's beginning
+            self._eyes.forget_before(waiting.span_ns[0])
             self.waiting.append(waiting)
 
     def _is_complete(self, waiting: _Waiting) -> bool:
