@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from tests.logs.drawn import SECOND_NS, START_NS, drive, log_of, on_walls, pose_at, sweep, write
 from wallkit.core.types import CameraImage, Odometry, PointCloud, Transform
 from wallkit.errors import LogError
+from wallkit.logs.eyes import Eyes
 from wallkit.logs.odometry import OdometryBuffer
 from wallkit.logs.reader import open_log
 from wallkit.logs.rig import CameraTopic, Wanted, find_rig
@@ -209,6 +210,22 @@ def test_two_cameras_and_a_clock_that_is_ahead(tmp_path):
         np.testing.assert_array_equal(first.odometry, second.odometry)
 
 
+@pytest.mark.parametrize("late_s", [0.0, 0.2, 0.8])
+@pytest.mark.parametrize("rate_hz", [10, 60])
+def test_a_fast_camera_and_sweeps_that_are_recorded_late(tmp_path, rate_hz, late_s):
+    """The image nearest in time is as near as the camera's rate allows, though many came since."""
+    late_ns = round((0.1 + late_s) * SECOND_NS)
+    pictures = images(offset_ns=7_000_000, every_ns=SECOND_NS // rate_hz, until_s=5.2)
+    late = [(s + late_ns if topic == "/scan" else s, topic, value) for s, topic, value in DRIVE]
+    frames, report = frames_of(tmp_path, sorted([*late, *pictures], key=lambda m: m[0]), wanted=CAMERA)
+    assert len(frames) == 20
+    assert report.frames_without_image == 0
+    for frame in frames:
+        middle_ns = frame.stamp_ns + SWEEP_NS // 2
+        nearest_ns = min((s for s, _, _ in pictures), key=lambda s: abs(s - middle_ns))
+        assert frame.views[0].moment_ns == nearest_ns
+
+
 def test_a_camera_that_dies_stops_no_frame(tmp_path):
     pictures = images(offset_ns=0, until_s=1.0)
     messages = sorted([*DRIVE, *pictures], key=lambda m: m[0])
@@ -256,6 +273,29 @@ def test_a_cloud_is_sliced_at_the_height_asked_for(tmp_path):
     assert on_walls(pose_at(MOTION, frames[0].stamp_ns), frames[0].points.xyz_m[:, :2]).max() > 0.5
 
 
+def test_the_whole_cloud_is_moved_as_the_slice_of_it_is(tmp_path):
+    """A LiDAR turns once in 0.1 s while the robot drives and turns: all of a frame's cloud is on the walls of the room."""
+
+    def cloud(stamp_ns):
+        scan = sweep(MOTION, stamp_ns, mount=MOUNT, interval_s=0.1 / 360)
+        ring = np.stack([scan.ranges_m * np.cos(scan.angles_rad), scan.ranges_m * np.sin(scan.angles_rad)], axis=-1)
+        rings = [np.column_stack([ring, np.full(360, z)]) for z in (0.3, 0.6, 1.5)]
+        offsets = np.tile(np.arange(360) * (0.1 / 360), 3)
+        return PointCloud(stamp_ns, "laser", np.vstack(rings).astype(np.float32), offsets_s=offsets.astype(np.float32))
+
+    messages = [(m[0], "/points", cloud(m[0])) if m[1] == "/scan" else m for m in DRIVE]
+    messages = sorted([*messages, *images(offset_ns=0, until_s=4.2)], key=lambda m: m[0])
+    frames, _ = frames_of(tmp_path, messages, wanted=CAMERA)
+    assert len(frames) == 20
+    for frame in frames:
+        assert frame.cloud_m.dtype == np.float32
+        # 50 Hz odometry interpolated, as for points
+        assert on_walls(pose_at(MOTION, frame.stamp_ns), frame.cloud_m[:, :2]).max() < 2e-4
+        in_time = np.argsort(frame.points.offsets_s)
+        np.testing.assert_allclose(frame.cloud_m[:360], frame.points.xyz_m[in_time], atol=2e-5)
+        np.testing.assert_allclose(frame.cloud_m[[0, 360, 720], 2], [0.3, 0.6, 1.5], atol=1e-6)
+
+
 @given(st.lists(st.integers(0, 50), min_size=2, max_size=40), st.integers(0, 50), st.integers(0, 50))
 def test_the_buffer_answers_as_if_it_held_everything(stamps, forget, at):
     """Against the plain formula over the whole history."""
@@ -294,3 +334,22 @@ def test_memory_does_not_grow_with_the_log(tmp_path, monkeypatch):
     frames_of(tmp_path, messages, SyncConfig(lookahead_s=1.0))
     assert len(sizes) == 3000
     assert max(sizes) < 100
+
+
+def test_images_are_held_no_longer_than_a_sweep_may_ask_for_them(tmp_path, monkeypatch):
+    """Of a camera at 100 Hz, with a sweep every 0.2 s: those since a tolerance before the last sweep."""
+    held = []
+    original = Eyes.take
+
+    def watched(self, topic, image):
+        taken = original(self, topic, image)
+        held.append(len(list(self.held)))
+        return taken
+
+    monkeypatch.setattr(Eyes, "take", watched)
+    pictures = images(offset_ns=0, every_ns=SECOND_NS // 100, until_s=4.2)
+    frames_of(tmp_path, sorted([*DRIVE, *pictures], key=lambda m: m[0]), wanted=CAMERA)
+    assert len(held) == 420
+    assert max(held[:380]) <= 20 + 6 + 1
+    # nothing asks any more: a second and the tolerance
+    assert max(held) <= 106 + 2

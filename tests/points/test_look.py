@@ -14,7 +14,7 @@ from wallkit.core.types import BeamLabels, CameraImage, Frame, Points, View
 from wallkit.points.labels import PASSED_OVER, labelled_scan, labels_by_beam, thinned
 from wallkit.points.look import Look, LookSettings, _share_out, look, project_frame
 from wallkit.points.outlines import classes_by_outlines
-from wallkit.points.project import hidden, project
+from wallkit.points.project import project
 from wallkit.segment.class_map import class_map
 
 FOCAL = 300.0
@@ -152,26 +152,6 @@ def test_polygons_say_what_the_mask_says_but_at_its_border(method):
     np.testing.assert_array_equal(found[clear], wanted[clear])
     assert (sure[clear] == 1).all()
     assert classes_by_outlines(segmentation, method)([[-5.0, 5.0]])[0].tolist() == [-1]
-
-
-def test_what_is_behind_something_is_hidden():
-    """A board at 2 m before a wall at 5 m; the camera half a metre to the left of the LiDAR sees past its edge."""
-    aside = T_CAMERA_LIDAR.copy()
-    aside[0, 3] = -0.5
-    calibration = replace(CALIBRATION, T_camera_lidar=aside)
-    y, z = np.meshgrid(np.linspace(-3, 3, 241), np.linspace(-1, 1, 81))
-    wall = np.column_stack([np.full(y.size, 5.0), y.ravel(), z.ravel()])
-    board = np.column_stack([np.full(y.size, 2.0), y.ravel() / 10, z.ravel()])
-    camera = np.array([0.0, -0.5])
-    projected, everything = project(calibration, wall), project(calibration, np.concatenate([wall, board]))
-    found = hidden(projected, everything, reach_px=6, margin_m=0.15, margin_per_m=0.05)
-    # where the sight line crosses the board's plane, seen from above
-    crossing = camera[1] + (wall[:, 1] - camera[1]) * 2 / 5
-    deep, clear = np.abs(crossing) < 0.26, np.abs(crossing) > 0.42
-    inside = projected.is_inside
-    assert found[deep & inside].mean() > 0.99
-    assert not found[clear & inside].any()
-    assert not hidden(project(calibration, board), everything, reach_px=6, margin_m=0.15, margin_per_m=0.05).any()
 
 
 def test_a_hidden_return_is_not_labelled():

@@ -245,8 +245,8 @@ class Frame:
         odometry_gap_s: longest time without an odometry message since the previous frame.
         views: the image of each camera that is nearest in time, where one is within the tolerance.
         labels: classes of the scan's beams, None where nobody knows them.
-        cloud_m: (P, 3) float32 in frame base, the whole 3-D cloud that `points` are a slice of; None without one, or
-            without a camera.
+        cloud_m: (P, 3) float32 in frame base at stamp_ns, the whole 3-D cloud that `points` are a slice of; None without
+            one, or without a camera.
     """
 
     stamp_ns: int

@@ -1,8 +1,8 @@
 """Messages of a log -> frames for the filter: one for each sweep, with odometry and images at the sweep's header stamp.
 
 Only header stamps are compared. Record time, which may be days off, says just one thing: how long a sweep has waited for
-messages that were recorded after it. Memory holds the sweeps that wait, the odometry since the oldest of them, and a few
-images, never the log.
+messages that were recorded after it. Memory holds the sweeps that wait, the odometry since the oldest of them, and a second
+of images at most, never the log.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 
 from wallkit.core.config import setting
 from wallkit.core.geometry import relative
-from wallkit.core.types import CameraImage, Frame, Odometry, PointCloud, Scan, View
+from wallkit.core.types import CameraImage, Float32Array, Frame, Odometry, PointCloud, Scan, View
 from wallkit.errors import LogError
-from wallkit.logs.clouds import scan_from_cloud, transformed
+from wallkit.logs.clouds import scan_from_cloud
 from wallkit.logs.eyes import Eyes, Taken
 from wallkit.logs.message import Value
 from wallkit.logs.odometry import OdometryBuffer
@@ -209,6 +209,8 @@ class _Synchroniser:
             waiting = _Waiting(scan, log_ns, sweep_span(scan), cloud)
             for image in self._eyes.held:
                 self._eyes.offer(waiting.images, waiting.middle_ns, image)
+            # the next sweep is later than this one, and so is its middle than this one's beginning
+            self._eyes.forget_before(waiting.span_ns[0])
             self.waiting.append(waiting)
 
     def _is_complete(self, waiting: _Waiting) -> bool:
@@ -229,6 +231,14 @@ class _Synchroniser:
                 found.append(View(topic, taken.image, taken.moment_ns, pose, speed, turn))
         return tuple(found)
 
+    def _cloud(self, waiting: _Waiting) -> Float32Array | None:
+        """The whole cloud that the sweep is a slice of."""
+        if waiting.cloud is None:
+            return None
+        from wallkit.logs.cloud_motion import cloud_in_base  # numba, for those who have a cloud and a camera
+
+        return cloud_in_base(waiting.cloud, self._rig.mount.matrix, self._odometry.poses_at, span_ns=waiting.span_ns)
+
     def _frame(self, waiting: _Waiting) -> Frame | None:
         scan = waiting.scan
         if reason := self._why_no_odometry(*waiting.span_ns):
@@ -240,6 +250,7 @@ class _Synchroniser:
             self._dropped("no return between the range limits")
             return None
         pose, views = self._odometry.pose_at(scan.stamp_ns), self._views(waiting)
+        cloud_m = self._cloud(waiting) if views else None
         gap_s = self._odometry.take_gap(scan.stamp_ns) * 1e-9
         self.report.frames += 1
         self.report.beams_dropped.update(points.dropped)
@@ -247,9 +258,6 @@ class _Synchroniser:
         self.report.images += len(views)
         if self._rig.cameras and not views:
             self.report.frames_without_image += 1
-        cloud_m = (
-            None if waiting.cloud is None or not views else transformed(waiting.cloud.points_m, self._rig.mount.matrix)
-        )
         return Frame(scan.stamp_ns, points, pose, gap_s, views, cloud_m=cloud_m)
 
     def _why_no_odometry(self, start_ns: int, end_ns: int) -> str:

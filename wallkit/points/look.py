@@ -20,7 +20,8 @@ from wallkit.core.config import setting
 from wallkit.core.geometry import matrix_from_pose, relative
 from wallkit.core.projection import project_points
 from wallkit.core.types import BoolArray, Float32Array, Float64Array, Frame, Int64Array, View
-from wallkit.points.project import Projection, hidden
+from wallkit.points.occlusion import hidden
+from wallkit.points.project import Projection
 
 # 95 % of a planar Gaussian lie within 2.448 sigma: 1 - 2 / 2.448^2 of the weight in the middle keeps the variance
 _MIDDLE = 0.666
@@ -49,9 +50,15 @@ class LookSettings:
     field_of_view_deg: float = setting(
         0.0, "returns farther to the side than half of it count as not seen; 0: the whole image", low=0, high=360
     )
-    hidden_px: float = setting(6.0, "3-D clouds: points so near in the image are on one line of sight", low=0.5)
-    hidden_m: float = setting(0.15, "3-D clouds: a point so much nearer hides the one behind it", low=0)
-    hidden_per_m: float = setting(0.05, "3-D clouds: and so much more per metre of depth", low=0)
+    hidden_deg: float = setting(
+        1.2,
+        "3-D clouds: points so near in direction are on one line of sight; half the angle between rings or more",
+        low=0.1,
+    )
+    hidden_m: float = setting(0.1, "3-D clouds: what is not so much nearer hides nothing", low=0.01)
+    hidden_slant_deg: float = setting(
+        85.0, "3-D clouds: a surface seen at up to this angle to its normal hides nothing of itself", low=0, high=90
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +95,8 @@ def project_frame(
     if settings.field_of_view_deg:
         is_seen = is_seen & _in_view(T, frame.points.xyz_m, settings.field_of_view_deg)
     if frame.cloud_m is not None:
-        cloud = Projection(*project_points(calibration.camera, T, frame.cloud_m))
-        near = {"margin_m": settings.hidden_m, "margin_per_m": settings.hidden_per_m}
-        is_seen = is_seen & ~hidden(projection, cloud, reach_px=settings.hidden_px, **near)
+        near = {"reach_deg": settings.hidden_deg, "margin_m": settings.hidden_m, "slant_deg": settings.hidden_slant_deg}
+        is_seen = is_seen & ~hidden(calibration.camera, T, frame.points.xyz_m, frame.cloud_m, **near)
     return projection, is_seen, _margins_px(calibration, frame, view, projection, settings)
 
 

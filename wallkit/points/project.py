@@ -61,29 +61,3 @@ def check_usable(calibration: Calibration, *, allow_unverified: bool = False) ->
         hint = "calibrate again, or pass --allow-unverified to use it all the same"
         raise CalibrationError(f"the calibration's verdict is FAIL ({said})", hint=hint)
     return calibration.T_camera_lidar
-
-
-def hidden(
-    points: Projection, others: Projection, *, reach_px: float, margin_m: float, margin_per_m: float
-) -> BoolArray:
-    """(K,) which points have something else before them as the camera sees it: another point nearer to it than a margin.
-
-    Args:
-        others: of everything known to be there, `points` among them.
-        reach_px: so near in the image two points are on one line of sight.
-        margin_m, margin_per_m: how much nearer; and per metre of depth, as a surface seen at a slant is near and far.
-    """
-    found = np.zeros(len(points.depths_m), dtype=bool)
-    seen, there = np.flatnonzero(points.is_inside), np.flatnonzero(others.is_inside & (others.depths_m > 0))
-    if not len(seen) or not len(there):
-        return found
-    cells = np.floor(others.pixels[there] / reach_px).astype(np.int64) + 1
-    wide, high = cells.max(axis=0) + 2
-    nearest = np.full((high + 1, wide + 1), np.inf)
-    np.minimum.at(nearest, (cells[:, 1], cells[:, 0]), others.depths_m[there])
-    at = np.floor(points.pixels[seen] / reach_px).astype(np.int64) + 1
-    at = np.minimum(at, (wide - 1, high - 1))
-    around = [nearest[at[:, 1] + dy, at[:, 0] + dx] for dy in (-1, 0, 1) for dx in (-1, 0, 1)]
-    depths = points.depths_m[seen]
-    found[seen] = np.min(around, axis=0) < depths - margin_m - margin_per_m * depths
-    return found
