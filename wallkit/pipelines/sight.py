@@ -23,17 +23,16 @@ from wallkit.pipelines.cameras import (
     Camera,
     CameraRequest,
     find_cameras,
-    ids_from_png,
-    oracle_names,
     too_seldom,
 )
+from wallkit.pipelines.segmenters import looks_of
 from wallkit.points.filters import PointsSettings
 from wallkit.points.labels import labels_by_beam
 from wallkit.points.look import ClassesAt, Look, LookSettings, look, project_frame
 from wallkit.points.outlines import classes_by_outlines
 from wallkit.points.perturb import PerturbSettings, perturbed, without_dropped
 from wallkit.segment.ahead import Seen, look_ahead
-from wallkit.segment.cache import SegmentationCache, cache_of
+from wallkit.segment.cache import SegmentationCache
 from wallkit.segment.default import DEFAULT, model_path
 from wallkit.segment.grown import grown
 
@@ -286,7 +285,7 @@ def sight_of(
         replace(camera, notes=(*camera.notes, *too_seldom(camera, image_tolerance_s)))
         for camera in (_perturbed(camera, points.perturb) for camera in cameras)
     )
-    looks, names, roles, cache = _oracle(log, segment) if is_oracle else _network(model, segment)
+    looks, names, roles, cache = looks_of(model, log, segment)
     for wanted in (points.wanted(name) for name in points.filters):
         if wanted and not set(wanted) & set(roles):
             listed = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
@@ -318,34 +317,6 @@ def picture_of(image: CameraImage) -> UInt8Array:
     """(H, W, 3) RGB of a recorded image."""
     pixels = pixels_from_image(image)
     return pixels if pixels.ndim == 3 else np.repeat(pixels[..., None], 3, axis=2)
-
-
-Looks = tuple[Callable[[CameraImage], Segmentation], tuple[str, ...], tuple[str, ...], SegmentationCache | None]
-
-
-def _oracle(log: Log, settings: SegmentSettings) -> Looks:
-    """What a simulator recorded, as a model that is never wrong."""
-    from wallkit.pipelines.simulate.camera import NO_CLASS
-    from wallkit.segment.class_map import class_map
-
-    names = oracle_names(log)
-
-    def segment(image: CameraImage) -> Segmentation:
-        return class_map(ids_from_png(image), names, settings.roles, nothing=NO_CLASS)
-
-    # no cache: the log holds the segmentations already
-    return segment, names, settings.roles.of(names), None
-
-
-def _network(model: str, settings: SegmentSettings) -> Looks:
-    from wallkit.segment.onnx_segmenter import load_segmenter
-
-    segmenter = load_segmenter(Path(model), settings)
-
-    def segment(image: CameraImage) -> Segmentation:
-        return segmenter.segment(pixels_from_image(image))
-
-    return segment, segmenter.names, segmenter.roles, cache_of(segmenter, settings.cache)
 
 
 def _perturbed(camera: Camera, settings: PerturbSettings) -> Camera:
