@@ -1,8 +1,10 @@
-.PHONY: demo test slow guides lint docs bench sample calibration evaluation-set evaluation-calibration
+.PHONY: demo test long slow guides lint docs bench sample calibration evaluation-set evaluation-calibration
 demo:
 	wallkit demo --overwrite
 test:
 	pytest -q
+long:
+	pytest -q -m long
 slow:
 	pytest -q -m slow
 guides:

@@ -207,6 +207,7 @@ def readme_command(end: str) -> list[str]:
     return found[0].split(" && ")
 
 
+@pytest.mark.long
 def test_the_readmes_demo_command_runs(tmp_path):
     *_, install, demo = readme_command("wallkit demo")
     assert install == "pip install ."

@@ -89,6 +89,7 @@ def test_a_good_transform_with_the_wrong_camera_info_fails_too(vlp16, tmp_path):
     assert {by["plane"]["verdict"], by["intrinsics"]["verdict"]} == {"FAIL"}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("axis", range(6))
 def test_vlp16_urdf_fails_only_where_the_set_can_tell(data, axis):
     """sigma about 0.12 0.12 0.32 deg and 5 9 2 mm: half a degree is beyond it, 2 cm only along the sharpest axes."""
@@ -154,6 +155,7 @@ def test_turtlebot_cannot_tell_and_names_three_directions(data, camera_2d, tmp_p
     assert found["unseen"] == ["height", "roll", "pitch"]
 
 
+@pytest.mark.long
 def test_turtlebot_with_20_mm_squares_is_flagged(data, camera_2d, tmp_path):
     found = asked(*turtlebot(data, camera_2d, "0.020", tmp_path), "--board", "chessboard:11x8:0.020")
     assert gates(found)["square-size"]["verdict"] == "FAIL"
@@ -178,6 +180,7 @@ def test_four_charuco_views_never_pass(data, tmp_path):
     assert by["focal"]["verdict"] == "CANNOT TELL"
 
 
+@pytest.mark.long
 def test_the_room_alone_finds_the_boards_answer_and_a_wrong_one(vlp16, tmp_path):
     """[M]: the minimum of the NID lies within 0.5 deg / 2 cm of the boards' answer; 2 deg of yaw is a FAIL."""
     _, calibration, here = vlp16

@@ -129,6 +129,7 @@ def test_few_views_say_what_the_noise_promises_or_more():
     assert spread_of(rows, np.full((2, 1), 5.0)).sigmas[0] > 3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("planar", "views", "excess"),
     [(True, 12, 1.0), (True, 20, 2.0), (True, 40, 1.0), (False, 12, 2.0), (False, 20, 1.0), (False, 40, 2.0)],

@@ -65,6 +65,7 @@ def test_offset_within_its_own_interval(tau_ms):
     assert f"{found.tau_s * 1e3:+.1f}" in found.words
 
 
+@pytest.mark.long
 def test_sigma_is_the_scatter_between_captures():
     errors, sigmas = [], []
     for seed in range(24):

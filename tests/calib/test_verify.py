@@ -389,6 +389,7 @@ def test_twice_is_the_same(good):
     np.testing.assert_array_equal(again.pixel_error, good.pixel_error)
 
 
+@pytest.mark.long
 def test_good_worlds_hardly_ever_fail():
     """24 worlds with the noise they declare, 2-D and 3-D, judged by the views they were made from and by others."""
     verdicts = []

@@ -77,6 +77,7 @@ def wait_for(found, seconds: float = 120.0) -> None:
         time.sleep(0.05)
 
 
+@pytest.mark.long
 def test_bad_logs_among_good_ones_and_what_is_done_is_not_done_again_even_on_a_cluster(wallkit, tmp_path):
     fleet = made(tmp_path, "one")
     for name in ("bad", "mapless"):
@@ -133,6 +134,7 @@ def one_worker_pretends_to_have(address: str, version: str) -> None:
         client.run(setattr, package, "__version__", version, workers=list(client.nthreads())[:1])
 
 
+@pytest.mark.long
 def test_other_things_are_not_touched(wallkit, fleet):
     done = wallkit("batch", "fleet.toml", "--out", "logs", cwd=fleet)
     assert done.code == 2

@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from tests.e2e.board_log import BOARD, K, T, stations, write_log
 from tests.maps.audit_worlds import FLOOR, with_wall
@@ -53,6 +54,7 @@ def rows_of(out: Path) -> list[dict[str, str]]:
     return list(csv.DictReader((out / "batch.csv").read_text().splitlines()))
 
 
+@pytest.mark.long
 def test_simulated_logs_are_audited_against_two_maps(wallkit, tmp_path):
     (tmp_path / "true.wkmap.urdf").write_bytes(write_draft(FLOOR))
     (tmp_path / "off.wkmap.urdf").write_bytes(write_draft(with_wall("east", (10.04, 0), (10.04, 7))))
@@ -75,6 +77,7 @@ def test_simulated_logs_are_audited_against_two_maps(wallkit, tmp_path):
     assert float(made["metrics.people"]) == 0
 
 
+@pytest.mark.long
 def test_a_bumped_calibration_fails(wallkit, tmp_path):
     camera = Camera("plumb_bob", 640, 480, K, np.zeros(5), frame="cam_optical")
     bumped = Calibration(camera, T_camera_lidar=moved(T, 2, np.radians(3.0)), lidar_frame="laser")

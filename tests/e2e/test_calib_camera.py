@@ -138,6 +138,7 @@ def test_a_result_is_not_overwritten_unasked(wallkit, pictures, tmp_path):
     assert (tmp_path / "out.toml").read_text() == "mine"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("words", "said"),
     [

@@ -12,6 +12,7 @@ from wallkit.calib.extrinsics.worlds import board_at
 from wallkit.calib.files.store import read_calibration
 
 
+@pytest.mark.long
 def test_a_log_is_calibrated(wallkit, board_log, tmp_path):
     (tmp_path / "board.toml").write_text(BOARD.toml())
     words = ("--board", "board.toml", "--sigma-range", "8mm")
@@ -32,6 +33,7 @@ def test_a_log_is_calibrated(wallkit, board_log, tmp_path):
     assert stored.provenance.inputs.keys() == {"log.mcap"}
 
 
+@pytest.mark.long
 def test_the_page_says_what_a_user_needs(wallkit, board_log, tmp_path):
     (tmp_path / "board.toml").write_text(BOARD.toml())
     done = wallkit("calib", "extrinsics", board_log, "--board", "board.toml")
@@ -48,6 +50,7 @@ def test_the_page_says_what_a_user_needs(wallkit, board_log, tmp_path):
     assert "20 mm is assumed" in done.err
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("words", "said"),
     [

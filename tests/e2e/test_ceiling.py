@@ -45,6 +45,7 @@ def test_fit_scales_a_photograph_by_odometry_and_says_how_well(wallkit, folder, 
     assert read_ceiling(tmp_path / "c.yaml").resolution_m == pytest.approx(found["resolution_m"], rel=1e-6)
 
 
+@pytest.mark.long
 def test_with_poses_the_photograph_lies_where_the_ceiling_is(wallkit, folder, tmp_path):
     words = (
         "ceiling",
@@ -67,6 +68,7 @@ def test_with_poses_the_photograph_lies_where_the_ceiling_is(wallkit, folder, tm
     assert wallkit(*words).code == 2
 
 
+@pytest.mark.long
 def test_build_stitches_what_was_drawn_and_finds_its_height(wallkit, folder, tmp_path):
     found = wallkit("ceiling", "build", folder / "log.mcap", "-o", "c.yaml", "--json", "-q").json
     assert found["height_m"] == pytest.approx(2.7, abs=0.03)

@@ -60,6 +60,7 @@ def logs(gl, tmp_path_factory):
     return folder
 
 
+@pytest.mark.long
 def test_logs_become_a_dataset_after_a_review(logs, tmp_path, wallkit):
     paths = [logs / "run1/log.mcap", logs / "run2/log.mcap"]
     looked = wallkit("dataset", "from-log", *paths, "--review", "-o", tmp_path / "look", "--json", "-q")
@@ -114,6 +115,7 @@ def test_poses_scans_and_labels_are_those_of_the_log(logs, tmp_path, wallkit):
     assert cameras["run1"]["/camera/front/camera_info"]["width"] == 96
 
 
+@pytest.mark.long
 def test_a_log_without_masks_has_no_labels(logs, tmp_path, wallkit):
     story = (logs / "story.toml").read_text().replace('masks = "raster"', 'masks = "none"')
     (tmp_path / "plain.toml").write_text(story)

@@ -23,6 +23,7 @@ COMMANDS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_command_needs_no_other_to_have_been_imported(name, wallkit_from_nothing):
     code, words = COMMANDS[name]

@@ -54,6 +54,7 @@ def test_from_the_true_start_it_agrees_with_the_reference(data, name, rmse_m, se
     assert min(value(e, "availability") for e in evaluations) >= 0.95
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seeds", SEEDS)
 def test_kidnapped_it_says_so_at_once_and_finds_itself_again(data, seeds):
     log, chart = data / "logs/robustness/kidnapped_150s_to_210s.mcap", data / "logs/carmen/csail.map.yaml"
@@ -96,6 +97,7 @@ def test_where_csail_differs_most_from_its_reference_the_map_agrees_with_the_est
         assert at_estimate > at_truth + 0.05
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seeds", SEEDS)
 @pytest.mark.parametrize(
     ("log", "chart", "lidar_pose", "end", "within_m"),
@@ -126,6 +128,7 @@ def test_from_nothing_it_ends_at_the_known_place_or_does_not_claim_to(
     assert right >= 0.9 * len(seeds)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seeds", SEEDS)
 @pytest.mark.parametrize("name", ["csail", "intel"])
 def test_from_nothing_on_long_logs_it_converges_and_is_never_confidently_wrong(data, name, seeds):

@@ -104,6 +104,7 @@ def test_a_faulty_map_ends_the_command_before_anything_is_written(wallkit, tmp_p
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.long
 @pytest.mark.data
 def test_an_imported_raster_localizes_as_well_as_itself(wallkit, tmp_path, data):
     log, chart = data / "logs/carmen/intel.mcap", data / "logs/carmen/intel.map.yaml"

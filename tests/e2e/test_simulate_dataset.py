@@ -81,6 +81,7 @@ def test_yolo_coco_and_png_tell_the_same(made):
     assert total[names.index("wall")] > 0.1 * total.sum()
 
 
+@pytest.mark.long
 def test_the_same_seed_gives_the_same_labels_also_by_two_processes(made, tmp_path, wallkit):
     out, _ = made
     again = wallkit("simulate", "dataset", *WORDS, "-o", tmp_path / "again", "--jobs", "2")

@@ -41,6 +41,7 @@ def folder(tmp_path_factory):
     return folder
 
 
+@pytest.mark.long
 def test_every_log_once_and_what_is_there_is_kept(folder, wallkit, tmp_path):
     first = wallkit("simulate", "set", folder, "--only", "room-6-*", "-o", "out", "--json", "-q")
     assert first.code == 0, first.err
@@ -114,6 +115,7 @@ def test_the_evaluation_set_is_six_places_five_crowds_three_seeds():
     assert seeds == ["1", "2", "3"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("place", ["corridor", "hall", "lab", "office", "restroom", "twins"])
 def test_a_place_has_a_sound_map_and_a_route_of_one_to_two_minutes(place):
     (request,) = requests_of(SetRequest(EVALUATION, (f"{place}-12-1",), pictures=False)).values()

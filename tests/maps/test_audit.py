@@ -39,6 +39,7 @@ def told(report):
 # ------------------------------------------------------------------------------------ nothing to tell
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("poses", [{}, FILTERED], ids=["true", "filtered"])
 def test_an_exact_map_raises_nothing_with_people_walking(seed, poses):
@@ -56,6 +57,7 @@ def test_a_bias_that_all_filtered_poses_share_moves_no_wall():
 # ------------------------------------------------------------------------------------------ one fault
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("poses", [{}, FILTERED], ids=["true", "filtered"])
 def test_a_wall_drawn_3_cm_off_is_told_with_an_honest_sigma(poses):
     """Over ten logs the offset is 3 cm within its sigma, at least as often as a normal distribution has it."""

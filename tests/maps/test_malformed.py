@@ -81,6 +81,7 @@ def test_the_example_is_clean_and_says_what_its_lidar_misses(data):
     assert unseen == {"window_n", "urinal_1", "sink_1", "mirror_1"}
 
 
+@pytest.mark.long
 @pytest.mark.data
 @pytest.mark.parametrize("kind", ["safe", "moderate"])
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case["file"])

@@ -39,6 +39,7 @@ def test_there_are_enough_kinds_of_faults():
     assert len(FAULTS) * PER_FAULT >= 500
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", FAULTS)
 def test_every_fault_is_noticed(name):
     for mutant in mutants(name, PER_FAULT):
@@ -54,6 +55,7 @@ def test_a_clean_map_raises_no_alarm(seed):
     assert [(f.code, f.message) for f in report.findings if f.severity != "info"] == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", FAULTS_OF_USE)
 def test_every_fault_of_use_is_noticed(name):
     rule, make = FAULTS_OF_USE[name]

@@ -110,6 +110,7 @@ def stand_in(path: Path, model: Path, fault: str) -> Path:
     return path
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("fault", "cause"),
     [

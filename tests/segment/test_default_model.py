@@ -44,6 +44,7 @@ def test_a_file_of_that_name_comes_first(tmp_path, monkeypatch):
     assert model_path(tmp_path / "default") == tmp_path / "default"
 
 
+@pytest.mark.long
 def test_walls_of_a_building_that_nobody_has_seen_are_found(tmp_path):
     """Drawn and rendered here, by a seed of its own."""
     pytest.importorskip("mujoco")

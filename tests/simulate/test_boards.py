@@ -88,6 +88,7 @@ def test_small_charuco_squares_are_refined_in_more_than_opencvs_single_pixel(gl)
     assert rms[0] < 0.8 * rms[1], rms
 
 
+@pytest.mark.long
 def test_a_board_in_pictures_is_as_large_and_as_far_as_it_truly_is(gl):
     """What the renderer does to squares that pixels cut: 0.3 to 1.4 mm per metre of board, half a millimetre of distance."""
     board, setup = board_from(PLATE), CameraSetup("front", photo=PERFECT)
@@ -124,6 +125,7 @@ def test_without_noise_of_ranges_the_truth_is_recovered(gl):
     assert abs(found.off[3]) < 0.3e-3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("frame", "rings"), [("laser", None), ("lidar_3d", Rings(16, 0.6))])
 def test_calibration_recovers_what_a_capture_was_made_with(gl, frame, rings):
     """Within its own 95 % intervals: of eighteen, fewer than fourteen once in five thousand times."""

@@ -113,6 +113,7 @@ def test_a_camera_that_cannot_be_is_refused_with_its_reason(a_map, tmp_path, cam
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.long
 def test_the_log_is_the_same_whoever_makes_the_pictures(gl, a_map, tmp_path):
     seen = replace(FRONT, pictures=True, masks="raster")
     for jobs in (1, 2):
