@@ -103,6 +103,18 @@ def test_polygons_keep_what_pixels_keep(world):
     assert by_polygon.kept == pytest.approx(by_pixel.kept, rel=0.03)
 
 
+def test_a_picture_shows_the_returns_that_were_passed_over_too(world):
+    (few,), (every,) = (
+        localize(ready(world, words=(f"points.look.returns={n}",)), moments=1).moments for n in (100, 0)
+    )
+    assert few.stamp_ns == every.stamp_ns
+    np.testing.assert_array_equal(few.all_pixels, every.all_pixels)
+    assert len(few.pixels) < 0.3 * len(few.all_pixels)
+    # those that were looked up are among them
+    assert {tuple(at) for at in few.pixels} <= {tuple(at) for at in few.all_pixels}
+    assert len(every.pixels) == len(every.all_pixels)
+
+
 def test_the_folder_names_the_model_it_was_run_with_by_its_hash(world, wallkit, tmp_path):
     words = ("--filter", "wall_mask", "--calib", world / "front.toml", "--init", "truth", "-q", "--particles", "300")
     for model, file in ((world / "colours.onnx", world / "colours.onnx"), ("default", model_path(Path("default")))):
@@ -339,6 +351,7 @@ def test_a_camera_that_nothing_looks_through_is_not_used(world):
     assert ready(world, ()).sight is None
     assert ready(world, (), words=("localize.sensor=per_class",)).sight is not None
     assert warnings_of(ready(world, ()))[-1].startswith("nothing looks through the camera")
+    assert warnings_of(prepared(world / "log.mcap", ("line_fit",), overlays=2))[-1].startswith("nothing looks through")
 
 
 def test_a_camera_is_found_by_name_or_topic_or_frame(world, tmp_path):

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from wallkit.evaluate.resources import Timers, mark_now, peak_memory_mb, update_times, usage_since
+from wallkit.evaluate.resources import Timers, begin, mark_now, peak_memory_mb, update_times, usage_since
 
 
 def test_a_busy_loop_uses_about_one_core():
@@ -24,6 +24,16 @@ def test_peak_memory_sees_what_was_allocated():
     block = np.ones(int(before * 1e6 / 8) + 20_000_000)  # larger than all there was: the peak must rise by 160 MB
     assert peak_memory_mb() > before + 100
     assert block[-1] == 1
+
+
+def test_a_run_does_not_report_the_peak_of_the_one_before_it():
+    if not os.access("/proc/self/clear_refs", os.W_OK):
+        pytest.skip("only Linux can begin anew")
+    block = np.ones(40_000_000)
+    during = peak_memory_mb()
+    del block
+    begin()
+    assert peak_memory_mb() < during - 200
 
 
 def test_a_child_does_not_report_its_parents_peak():

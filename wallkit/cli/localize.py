@@ -107,11 +107,11 @@ def localize(ctx: click.Context, /, logs: tuple[Path, ...], **flags: Any) -> Non
       wallkit localize log.mcap --map floor.yaml --ceiling ceiling.yaml
       wallkit localize log.mcap --map floor.yaml --out - --format tum > poses.tum
     """
-    from wallkit.evaluate.resources import mark_now
+    from wallkit.evaluate.resources import begin
     from wallkit.pipelines.config import load_config
     from wallkit.pipelines.localize import prepare
 
-    mark = mark_now()
+    mark = begin()
     loaded = load_config(
         flags["config_path"],
         flags["words"],
@@ -185,7 +185,7 @@ def warnings_of(prepared: Prepared) -> list[str]:
     cameras = prepared.request.cameras
     if prepared.fallen_back:
         found.append(f"the LiDAR alone is used: {prepared.fallen_back}")
-    elif prepared.sight is None and (cameras.model or cameras.calibrations):
+    elif prepared.sight is None and (cameras.model or cameras.calibrations or cameras.overlays):
         found.append("nothing looks through the camera: --filter wall_mask, soft_mask or reject_dynamic would")
     return found
 

@@ -6,7 +6,7 @@ import re
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
@@ -65,14 +65,27 @@ def mark_now() -> Mark:
     return Mark(time.perf_counter_ns(), time.process_time_ns())
 
 
+def begin() -> Mark:
+    """The moment a run begins: the peak of memory is counted anew, where the system allows it (Linux)."""
+    with suppress(OSError):
+        # proc(5): 5 resets VmHWM to what is resident now
+        Path("/proc/self/clear_refs").write_text("5")
+    return mark_now()
+
+
 def usage_since(mark: Mark) -> dict[str, Value]:
-    """wall_s and cpu_percent of this process since the mark, and its peak_memory_mb since it began."""
+    """wall_s and cpu_percent of this process since the mark, and its peak_memory_mb since `begin`."""
     wall_s = (time.perf_counter_ns() - mark.wall_ns) / 1e9
     cpu_s = (time.process_time_ns() - mark.cpu_ns) / 1e9
     values = (
         Value("wall_s", wall_s, "s", "time the run took"),
         Value("cpu_percent", 100 * cpu_s / wall_s, "%", "CPU time over wall time; 100 is one core fully used"),
-        Value("peak_memory_mb", peak_memory_mb(), "MB", "largest resident memory of the process, 1 MB is 10⁶ bytes"),
+        Value(
+            "peak_memory_mb",
+            peak_memory_mb(),
+            "MB",
+            "largest resident memory of the process during the run, 1 MB is 10⁶ bytes",
+        ),
     )
     return {value.key: value for value in values}
 
@@ -92,7 +105,7 @@ def update_times(update_ms: Float64Array) -> dict[str, Value]:
 
 
 def peak_memory_mb() -> float | None:
-    """Largest resident memory of this process so far [10^6 bytes]; None where the system does not tell (Windows).
+    """Largest resident memory of this process since `begin` [10^6 bytes]; None where the system does not tell (Windows).
 
     Linux is asked for VmHWM: getrusage's ru_maxrss survives exec, so a small process started by a large one would
     report the large one's peak. macOS has only ru_maxrss, in bytes where Linux counts KiB (getrusage(2)).

@@ -17,7 +17,7 @@ import numpy as np
 from wallkit.core.steps import Steps
 from wallkit.core.types import Estimate, StampedPose, Trajectory
 from wallkit.errors import ConfigError, WallkitError
-from wallkit.evaluate.resources import Mark, Timers, mark_now
+from wallkit.evaluate.resources import Mark, Timers, begin
 from wallkit.evaluate.tum import read_tum
 from wallkit.localize.ceiling_filter import CeilingLocalizer, ceiling_localizer
 from wallkit.localize.ekf import ScanMatchingEkf, scan_matching_ekf
@@ -176,7 +176,7 @@ def localize(
         mark: when the run began, for its times.
         moments: how many images to keep with what the filters made of them.
     """
-    p, timers, mark = prepared, Timers(), mark or mark_now()
+    p, timers, mark = prepared, Timers(), mark or begin()
     with timers.phase("prepare"):
         tracker, filters = _tracker(p), p.config.points.on(p.map.fields)
         of_lidar = p.config.points.without_camera().on(p.map.fields)
@@ -192,7 +192,7 @@ def localize(
             with timers.phase("filter"):
                 began = time.perf_counter_ns()
                 belief = tracker.predict(rng, belief, frame.odometry, frame.odometry_gap_s)
-                scan, seen = labelled_scan(frame), None
+                whole, scan, seen = frame, labelled_scan(frame), None
                 # the ceiling is seen at any time between two scans: each sensor has a rate of its own
                 belief = seen_by(tracker, belief, views.until(frame.stamp_ns))
                 # an image is looked at only for an update: most scans need none
@@ -208,7 +208,7 @@ def localize(
             estimate = belief.estimate(frame.stamp_ns)
             recorder.add(frame, estimate, info, belief, elapsed_ms + (seen.owed_ms if seen else 0.0))
             if filters and info.is_update:
-                watch.add(frame, scan, seen)
+                watch.add(frame, scan, seen, whole)
             if messages:
                 with timers.phase("write"):
                     messages.add(frame, estimate, info, belief)

@@ -37,11 +37,14 @@ def write_overlays(folder: Path, log: Log, moments: Sequence[Moment], *, with_fi
     for number, (moment, rgb) in enumerate(zip(moments, pictures, strict=True)):
         seconds = (moment.stamp_ns - first_ns) / 1e9
         title = f"camera {moment.camera.name}, scan {moment.stamp_ns / 1e9:.3f} s"
-        drawn = draw_filtered(rgb, moment.ids, moment.classes, moment.pixels, moment.weights, title=title)
-        kept = int((moment.weights >= 0.5).sum())
+        drawn = draw_filtered(
+            rgb, moment.ids, moment.classes, moment.pixels, moment.weights, moment.all_pixels, title=title
+        )
+        kept, count, every = int((moment.weights >= 0.5).sum()), len(moment.weights), len(moment.all_pixels)
+        looked_up = "" if count == every else f", {count} of them are looked up (black)"
         caption = (
-            f"Camera {moment.camera.name}, {seconds:.1f} s after the first of these: {len(moment.weights)} returns fall on"
-            f" the image (left), {kept} of them are kept (right, green)."
+            f"Camera {moment.camera.name}, {seconds:.1f} s after the first of these: {every} returns fall on"
+            f" the image (left){looked_up}, {kept} are kept (right, green)."
         )
         name = f"{number:03d}_{moment.camera.name}_{moment.stamp_ns}"
         if with_files:

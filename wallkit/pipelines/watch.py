@@ -15,6 +15,7 @@ from wallkit.pipelines.sight import Glance, Labelled, Sight
 from wallkit.points.filters import PointsSettings
 from wallkit.points.kept import kept_of
 from wallkit.points.labels import PASSED_OVER
+from wallkit.points.look import project_frame
 
 # what a return counts as that no camera labelled
 UNSEEN = "not seen"
@@ -124,7 +125,8 @@ class Moment:
 
     Attributes:
         classes: names of `ids` (H, W) uint8 place in them, 255 for none.
-        pixels: (K, 2) of all returns on the image; weights: (K,).
+        pixels: (K, 2) of the returns on the image that were looked up; weights: (K,).
+        all_pixels: (N, 2) of those that were passed over too.
     """
 
     camera: Camera
@@ -134,6 +136,7 @@ class Moment:
     ids: UInt8Array
     pixels: Float64Array
     weights: Float32Array
+    all_pixels: Float64Array
 
 
 class Watch:
@@ -154,8 +157,8 @@ class Watch:
         self._moments: list[Moment] = []
         self._every, self._looked = 1, 0
 
-    def add(self, frame: Frame, scan: LabelledScan, seen: Labelled | None) -> None:
-        """One update."""
+    def add(self, frame: Frame, scan: LabelledScan, seen: Labelled | None, whole: Frame) -> None:
+        """One update; `whole` is the frame with the returns that were passed over."""
         left = kept_of(scan, self._points.kept)
         self._updates += 1
         self._few += left.is_few
@@ -175,7 +178,7 @@ class Watch:
         self._images += len(seen.glances)
         self._silent.update(seen.silent.items())
         if seen.glances and self._wanted:
-            self._keep(frame, scan, seen.glances)
+            self._keep(whole, scan, seen.glances)
 
     def filtering(self) -> Filtering:
         """So far."""
@@ -211,14 +214,29 @@ class Watch:
         chosen = np.linspace(0, len(self._moments) - 1, self._wanted).round().astype(int)
         return tuple(self._moments[i] for i in chosen)
 
-    def _keep(self, frame: Frame, scan: LabelledScan, glances: tuple[Glance, ...]) -> None:
+    def _keep(self, whole: Frame, scan: LabelledScan, glances: tuple[Glance, ...]) -> None:
         """Every n-th glance, n doubling whenever twice the wanted number is reached."""
         for glance in glances:
             if self._looked % self._every == 0:
-                self._moments.append(_moment(frame, scan, glance))
+                self._moments.append(self._moment(whole, scan, glance))
             self._looked += 1
         if len(self._moments) >= 2 * self._wanted + 1:
             self._moments, self._every = self._moments[::2], 2 * self._every
+
+    def _moment(self, whole: Frame, scan: LabelledScan, glance: Glance) -> Moment:
+        assert self._sight is not None  # somebody glanced
+        at = np.flatnonzero(glance.look.is_seen)
+        roles = glance.segmentation.roles
+        classes = tuple(dict.fromkeys(roles))
+        place = np.array([*(classes.index(role) for role in roles), 255], dtype=np.uint8)
+        ids = place[glance.segmentation.labels()]
+        pixels = glance.look.projection.pixels[at]
+        of_all, is_seen, _ = project_frame(
+            glance.camera.calibration, whole, glance.view, self._sight.T_lidar_base, self._points.look
+        )
+        return Moment(
+            glance.camera, glance.view, whole.stamp_ns, classes, ids, pixels, scan.weights[at], of_all.pixels[is_seen]
+        )
 
 
 def _described(camera: Camera) -> dict[str, Any]:
@@ -231,14 +249,3 @@ def _described(camera: Camera) -> dict[str, Any]:
         "verdict": camera.calibration.verdict,
         "notes": list(camera.notes),
     }
-
-
-def _moment(frame: Frame, scan: LabelledScan, glance: Glance) -> Moment:
-    at = np.flatnonzero(glance.look.is_seen)
-    roles = glance.segmentation.roles
-    classes = tuple(dict.fromkeys(roles))
-    place = np.array([*(classes.index(role) for role in roles), 255], dtype=np.uint8)
-    ids = place[glance.segmentation.labels()]
-    return Moment(
-        glance.camera, glance.view, frame.stamp_ns, classes, ids, glance.look.projection.pixels[at], scan.weights[at]
-    )

@@ -8,7 +8,7 @@ import numpy as np
 
 from wallkit.core.types import BoolArray, Float32Array, Float64Array, UInt8Array
 
-KEPT_RGB, REJECTED_RGB, BEFORE_RGB = (0, 200, 83), (255, 23, 68), (30, 30, 30)
+KEPT_RGB, REJECTED_RGB, BEFORE_RGB, PASSED_RGB = (0, 200, 83), (255, 23, 68), (30, 30, 30), (245, 245, 245)
 NOTHING = 255
 _COLOURS = {
     "wall": (105, 140, 215),
@@ -39,6 +39,7 @@ def draw_filtered(
     classes: Sequence[str],
     pixels: Float64Array,
     weights: Float32Array,
+    all_pixels: Float64Array,
     *,
     title: str = "",
 ) -> UInt8Array:
@@ -46,16 +47,19 @@ def draw_filtered(
 
     Args:
         rgb: (H, W, 3). ids: (H, W) place in `classes`, NOTHING where nobody can tell.
-        pixels: (K, 2) of the returns. weights: (K,): 1 is green, 0 red.
+        pixels: (K, 2) of the returns that were looked up. weights: (K,): 1 is green, 0 red.
+        all_pixels: (N, 2) of all returns; those that were passed over are small and pale on the left.
     """
     masked = _masked(rgb, ids, classes)
     count, kept = len(weights), int((weights >= 0.5).sum())
-    before = _with_points(masked, pixels, np.tile(np.array(BEFORE_RGB), (count, 1)), np.ones(count, dtype=bool))
+    pale = _with_dots(masked, all_pixels) if len(all_pixels) > count else masked
+    before = _with_points(pale, pixels, np.tile(np.array(BEFORE_RGB), (count, 1)), np.ones(count, dtype=bool))
     share = weights.astype(np.float64)[:, None]
     colours = share * np.array(KEPT_RGB) + (1 - share) * np.array(REJECTED_RGB)
     after = _with_points(masked, pixels, colours, weights >= 0.5)
     shown = [classes[i] for i in np.unique(ids) if i != NOTHING]
-    words = f"{count} returns in the image", f"{kept} kept (green), {count - kept} rejected (red)"
+    looked_up = f", {count} looked up (black)" if len(all_pixels) > count else ""
+    words = f"{len(all_pixels)} returns in the image{looked_up}", f"{kept} kept (green), {count - kept} rejected (red)"
     top = np.concatenate([_band(masked.shape[1], text) for text in words], axis=1)
     return np.concatenate([top, np.concatenate([before, after], axis=1), _legend(2 * masked.shape[1], shown, title)])
 
@@ -70,6 +74,15 @@ def _masked(rgb: UInt8Array, ids: UInt8Array, classes: Sequence[str]) -> UInt8Ar
     border[1:] |= ids[1:] != ids[:-1]
     blend[border] = 0.4 * blend[border] + 0.6 * 255
     return np.ascontiguousarray(blend.astype(np.uint8))
+
+
+def _with_dots(rgb: UInt8Array, pixels: Float64Array) -> UInt8Array:
+    import cv2
+
+    canvas, radius = rgb.copy(), max(1, round(rgb.shape[1] / 480))
+    for u, v in np.round(pixels):
+        cv2.circle(canvas, (int(u), int(v)), radius, PASSED_RGB, -1, cv2.LINE_AA)
+    return canvas
 
 
 def _with_points(rgb: UInt8Array, pixels: Float64Array, colours: Float64Array, is_kept: BoolArray) -> UInt8Array:

@@ -146,12 +146,12 @@ def time_pipeline(log: Path, map_path: Path | None, init: str | None) -> dict[st
     """Seconds of a whole run by phase: opening, reading and decoding, filtering, writing, drawing the report."""
     import tempfile
 
-    from wallkit.evaluate.resources import mark_now, usage_since
+    from wallkit.evaluate.resources import begin, usage_since
     from wallkit.pipelines.config import load_config
     from wallkit.pipelines.localize import Request, prepare
     from wallkit.pipelines.seeds import run_seed
 
-    mark = mark_now()
+    mark = begin()
     loaded = load_config(None)
     began = time.perf_counter()
     prepared = prepare(Request((log,), map_path, init=init), loaded.config)
