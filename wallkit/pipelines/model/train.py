@@ -145,7 +145,8 @@ def check_libraries() -> None:
 
     missing = [name for name in ("torch", "onnx") if find_spec(name) is None]
     if missing:
-        hint = "pip install 'wallkit[train]'   (no GPU? pip install torch==2.13.0+cpu first: a tenth of the size)"
+        cpu = "pip install torch --index-url https://download.pytorch.org/whl/cpu"
+        hint = f"pip install 'wallkit[train]'   (no GPU? first {cpu}: a tenth of the size)"
         raise ModelError(f"training needs {' and '.join(missing)}, not installed here", hint=hint)
 
 
