@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.train.flat import NAMES, flat, flat_set
-from wallkit.errors import DatasetError, ModelError
+from wallkit.errors import DatasetError, ModelError, OutputError
 from wallkit.pipelines.model import train as model_train
 from wallkit.pipelines.model.train import TrainRequest, check_request, train_model
 
@@ -65,6 +65,31 @@ def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(tmp_path):
     assert [epoch.number for epoch in resumed.epochs] == [1, 2, 3]
     for a, b in zip(whole.net.state_dict().values(), resumed.net.state_dict().values(), strict=True):
         torch.testing.assert_close(a, b)
+
+
+def test_an_interrupted_training_is_lost_only_when_asked(tmp_path):
+    torch_or_skip()
+    rooms = flat_set(tmp_path / "rooms", train=4, val=2)
+    request = TrainRequest((rooms,), (64, 64), epochs=2, batch=4)
+
+    def stop(epoch, of):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train_model(request, tmp_path / "net", told=stop)
+    kept = (tmp_path / ".net.unfinished" / "checkpoint.pt").read_bytes()
+    other = replace(request, epochs=3, seed=7)
+    for act in (check_request, train_model):
+        with pytest.raises(OutputError, match="other settings: epochs 2, now 3; seed 0, now 7") as caught:
+            act(other, tmp_path / "net", overwrite=False)
+        assert "--overwrite" in caught.value.hint
+    assert (tmp_path / ".net.unfinished" / "checkpoint.pt").read_bytes() == kept
+    check_request(other, tmp_path / "net", overwrite=True)
+    # the machine is no part of what is learnt
+    done = train_model(replace(request, threads=2), tmp_path / "net")
+    assert done.resumed == 1
+    assert json.loads((tmp_path / "net" / "run.json").read_text())["threads"] == 2
+    assert not (tmp_path / ".net.unfinished").exists()
 
 
 def test_training_writes_a_model_that_is_used_like_any_other(tmp_path):

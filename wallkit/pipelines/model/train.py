@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -13,6 +12,13 @@ import wallkit
 from wallkit.dataset.read import TrainingSet, read_pair, read_training_sets
 from wallkit.errors import ModelError
 from wallkit.pipelines.model.evaluate import Judged, evaluate_model
+from wallkit.pipelines.model.unfinished import (
+    check_unfinished,
+    close_unfinished,
+    has_epochs,
+    open_unfinished,
+    unfinished_folder,
+)
 from wallkit.pipelines.outputs import check_out, put_in_place
 from wallkit.pipelines.run_folder import write_json
 from wallkit.train.curves import Epoch, csv_of, draw_curves
@@ -60,7 +66,7 @@ def train_model(
 ) -> Trained:
     """A folder with model.onnx, curves.csv and .png, scores.json, masks.png and run.json.
 
-    A run that is interrupted goes on after its last whole epoch when it is started again.
+    A run that is interrupted goes on after its last whole epoch when it is started again, on as many threads as one likes.
 
     Args:
         told: hears of every epoch that is done, and of how many there will be.
@@ -70,12 +76,9 @@ def train_model(
     """
     sets = check_request(request, out, overwrite=overwrite)
     lesson = lesson_of(request)
-    working = out.absolute().with_name(f".{out.name}.unfinished")
     fingerprint = _fingerprint(sets, lesson)
-    if not _is_of(working, fingerprint):
-        shutil.rmtree(working, ignore_errors=True)
-        working.mkdir(parents=True)
-        write_json(working / "request.json", fingerprint)
+    working = unfinished_folder(out)
+    checkpoint = open_unfinished(working, fingerprint)
     from wallkit.train.export import export_onnx
     from wallkit.train.learn import learn
     from wallkit.train.network import parameters_of
@@ -91,7 +94,6 @@ def train_model(
         fresh.append(epoch.number)
         told(epoch, lesson.epochs)
 
-    checkpoint = working / "checkpoint.pt"
     learnt = learn(train, val, names, lesson, checkpoint, told=hear)
     parameters = parameters_of(learnt.net)
     about = _about(sets, scores_of(learnt.matrix, names), parameters)
@@ -106,12 +108,12 @@ def train_model(
         "schema": 1,
         "command": "model train",
         **fingerprint,
+        "threads": lesson.threads,
         "added_to_scores": balanced,
         "export": asdict(exported),
     }
     write_json(working / "run.json", record)
-    checkpoint.unlink()
-    (working / "request.json").unlink()
+    close_unfinished(working)
     put_in_place(working, out)
     resumed = lesson.epochs - len(fresh)
     return Trained(out / "model.onnx", learnt.epochs, judged, exported.size_bytes, parameters, resumed)
@@ -121,7 +123,8 @@ def check_request(request: TrainRequest, out: Path, *, overwrite: bool) -> tuple
     """The training sets; refuses what cannot be done before anything is.
 
     Raises:
-        OutputError: `out` cannot be used. ModelError: PyTorch or onnx is not installed, or settings that are none.
+        OutputError: `out` cannot be used, or an interrupted training of other settings is there.
+        ModelError: PyTorch or onnx is not installed, or settings that are none.
         DatasetError: a set cannot be read, has no pictures for validation, or its classes are not those of the first.
     """
     check_out(out, overwrite=overwrite)
@@ -132,6 +135,9 @@ def check_request(request: TrainRequest, out: Path, *, overwrite: bool) -> tuple
             raise ModelError(f"a network for pictures of {width} x {height}", hint=hint)
     sets = read_training_sets(request.datasets)
     check_libraries()
+    working = unfinished_folder(out)
+    if has_epochs(working):
+        check_unfinished(working, _fingerprint(sets, lesson_of(request)), overwrite=overwrite)
     return sets
 
 
@@ -189,7 +195,7 @@ def _about(sets: tuple[TrainingSet, ...], scores: tuple[ClassScore, ...], parame
 
 
 def _fingerprint(sets: tuple[TrainingSet, ...], lesson: Lesson) -> dict[str, Any]:
-    """Everything that decides what is learnt, but for the machine."""
+    """Everything that decides what is learnt, but for the machine and its threads."""
     import torch
 
     plain = {
@@ -197,13 +203,6 @@ def _fingerprint(sets: tuple[TrainingSet, ...], lesson: Lesson) -> dict[str, Any
         "torch": torch.__version__,
         "datasets": [{"folder": one.folder.name, "manifest_sha256": one.sha256} for one in sets],
         "names": list(sets[0].names),
-        "lesson": asdict(lesson),
+        "lesson": {key: value for key, value in asdict(lesson).items() if key != "threads"},
     }
     return dict(json.loads(json.dumps(plain)))
-
-
-def _is_of(working: Path, fingerprint: dict[str, Any]) -> bool:
-    try:
-        return bool(json.loads((working / "request.json").read_text("utf-8")) == fingerprint)
-    except (OSError, ValueError):
-        return False
