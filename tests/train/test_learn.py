@@ -92,6 +92,14 @@ def test_an_interrupted_training_is_lost_only_when_asked(tmp_path):
     assert not (tmp_path / ".net.unfinished").exists()
 
 
+def test_scores_are_of_all_sets(tmp_path):
+    torch_or_skip()
+    sets = tuple(flat_set(tmp_path / name, train=2, val=val, seed=val) for name, val in (("rooms", 1), ("more", 3)))
+    done = train_model(TrainRequest(sets, (64, 64), epochs=1, batch=4), tmp_path / "net")
+    assert done.judged.pictures == 4
+    assert json.loads((tmp_path / "net" / "scores.json").read_text())["pictures"] == 4
+
+
 def test_training_writes_a_model_that_is_used_like_any_other(tmp_path):
     torch_or_skip()
     from wallkit.segment.onnx_segmenter import load_segmenter

@@ -87,6 +87,15 @@ def read_training_sets(folders: Sequence[Path]) -> tuple[TrainingSet, ...]:
     return sets
 
 
+def pairs_of(sets: Sequence[TrainingSet], split: str) -> tuple[Pair, ...]:
+    """The pictures of a part of several sets, in their order.
+
+    Raises:
+        DatasetError: one has none.
+    """
+    return tuple(pair for one in sets for pair in one.of(split))
+
+
 def read_pair(pair: Pair, classes: int) -> tuple[UInt8Array, UInt8Array]:
     """(H, W, 3) RGB and (H, W) numbers of a picture.
 

@@ -74,13 +74,14 @@ def _check_flags(flags: dict[str, Any]) -> None:
 def _own(datasets: tuple[Path, ...], out: Path, flags: dict[str, Any]) -> None:
     """wallkit's own network, by PyTorch."""
     from wallkit.cli.model.evaluate import evaluation_text
+    from wallkit.dataset.read import pairs_of
     from wallkit.pipelines.model.train import TrainRequest, check_request, train_model
 
     numbers = {name: flags[name] for name in ("size", "epochs", "batch", "rate", "threads", "seed")}
     request = TrainRequest(datasets, **numbers)
     if flags["dry_run"]:
         sets = check_request(request, out, overwrite=flags["overwrite"])
-        train_count, val_count = (sum(len(one.of(split)) for one in sets) for split in ("train", "val"))
+        train_count, val_count = (len(pairs_of(sets, split)) for split in ("train", "val"))
         click.echo(f"would write {out}: trained on {train_count} pictures, judged on {val_count} others")
         return
 

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import wallkit
-from wallkit.dataset.read import TrainingSet, read_pair, read_training_sets
+from wallkit.dataset.read import TrainingSet, pairs_of, read_pair, read_training_sets
 from wallkit.errors import ModelError
-from wallkit.pipelines.model.evaluate import Judged, evaluate_model
+from wallkit.pipelines.model.evaluate import Judged, evaluate_on
 from wallkit.pipelines.model.unfinished import (
     check_unfinished,
     close_unfinished,
@@ -98,7 +98,7 @@ def train_model(
     parameters = parameters_of(learnt.net)
     about = _about(sets, scores_of(learnt.matrix, names), parameters)
     exported = export_onnx(learnt.net, names, lesson.size, working / "model.onnx", about=about)
-    judged = evaluate_model(working / "model.onnx", sets[0].folder, "val", sheet=working / "masks.png")
+    judged = evaluate_on(sets, working / "model.onnx", "val", sheet=working / "masks.png")
     (working / "curves.csv").write_text(csv_of(learnt.epochs), encoding="utf-8")
     pictures = f"{len(train)} pictures, {len(val)} of other scenes for validation"
     draw_curves(learnt.epochs, working / "curves.png", title=f"{parameters / 1e6:.2f} M parameters on {pictures}")
@@ -176,8 +176,7 @@ def lesson_of(request: TrainRequest) -> Lesson:
 
 
 def _pictures(sets: tuple[TrainingSet, ...], split: str, size: tuple[int, int]) -> Pictures:
-    pairs = (read_pair(pair, len(one.names)) for one in sets for pair in one.of(split))
-    return stacked(pairs, size)
+    return stacked((read_pair(pair, len(sets[0].names)) for pair in pairs_of(sets, split)), size)
 
 
 def _about(sets: tuple[TrainingSet, ...], scores: tuple[ClassScore, ...], parameters: int) -> dict[str, str]:
