@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from wallkit.dataset.read import TrainingSet, read_training_sets
+from wallkit.dataset.read import TrainingSet, folders_of, read_training_sets
 from wallkit.pipelines.outputs import check_out, result_folder
 from wallkit.pipelines.run_folder import sha256, write_json
 from wallkit.segment.child import Interpreter, find_interpreter
@@ -104,7 +104,7 @@ def _data(sets: tuple[TrainingSet, ...], folder: Path) -> Path:
     """A data.yaml with whole paths: Ultralytics takes relative ones from a folder of its own."""
     lines = ["names:", *(f"  {number}: {name}" for number, name in enumerate(sets[0].names))]
     for split in ("train", "val"):
-        lines += [f"{split}:", *(f"  - {one.folder.absolute() / 'images' / split}" for one in sets)]
+        lines += [f"{split}:", *(f"  - {place}" for place in folders_of(sets, split))]
     path = folder / "data.yaml"
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
