@@ -114,3 +114,23 @@ def test_the_command_prints_a_table_and_judges(tmp_path, rooms, capsys):
     assert done.value.code == 1
     assert document["short"]["wall"][1] == 1.0
     assert document["classes"]["toilet"]["iou"] > 0.8
+
+
+def test_a_sheet_that_cannot_be_written_is_said_before_the_run(tmp_path, rooms, monkeypatch, capsys):
+    from wallkit.cli.app import main
+    from wallkit.pipelines.model import evaluate
+
+    path, mine = str(model(tmp_path, USUAL)), tmp_path / "mine.png"
+    mine.write_bytes(b"mine")
+    with monkeypatch.context() as patched:
+        patched.setattr(evaluate, "evaluate_model", lambda *_, **__: pytest.fail("it ran"))
+        for sheet, says in ((mine, "exists"), (tmp_path / "no" / "m.png", "its folder does not exist")):
+            with pytest.raises(SystemExit) as done:
+                main(["model", "evaluate", path, str(rooms), "--sheet", str(sheet), "-q"])
+            assert done.value.code == 2
+            assert says in capsys.readouterr().err
+    assert mine.read_bytes() == b"mine"
+    with pytest.raises(SystemExit) as done:
+        main(["model", "evaluate", path, str(rooms), "--sheet", str(mine), "--overwrite", "-q"])
+    assert done.value.code == 0
+    assert mine.read_bytes().startswith(b"\x89PNG")

@@ -15,6 +15,7 @@ from wallkit.dataset.classes import LabelSet
 from wallkit.dataset.read import TrainingSet, pairs_of, read_pair, read_training_set
 from wallkit.dataset.sheet import Tile, contact_sheet
 from wallkit.errors import ModelError, closest
+from wallkit.pipelines.outputs import write_whole
 from wallkit.segment.onnx_segmenter import OnnxSegmenter, load_segmenter
 from wallkit.segment.roles import OTHER, Roles
 from wallkit.segment.settings import SegmentSettings
@@ -140,7 +141,7 @@ def evaluate_on(
         progress(number + 1)
     if sheet is not None:
         title = f"{model.name} on {' and '.join(one.folder.name for one in sets)}"
-        sheet.write_bytes(contact_sheet(tiles, LabelSet(names=names), title=title))
+        write_whole(sheet, contact_sheet(tiles, LabelSet(names=names), title=title))
     total, network = (np.median(np.array(times), axis=0) * 1e3).round(2).tolist()
     return Judged(names, matrix, _scores(matrix, names), len(pairs), without, (total, network))
 
