@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from tests.train.flat import NAMES, flat, flat_set
 from wallkit.dataset.read import folders_of, pairs_of, read_pair, read_training_set, read_training_sets
@@ -95,6 +96,39 @@ def test_an_empty_part_is_said_with_what_there_is(tmp_path):
     with pytest.raises(DatasetError, match=r"'val' part \(train 2, val 0\)") as caught:
         found.of("val")
     assert "--val 0.2" in caught.value.hint
+
+
+@pytest.mark.parametrize(
+    ("file", "data", "says"),
+    [
+        ("images/val/scene_00001_00.jpg", b"", "0 bytes are no picture"),
+        ("images/val/scene_00001_00.jpg", b"no picture", "10 bytes are no picture"),
+        ("masks/val/scene_00001_00.png", b"", "0 bytes are no label PNG"),
+        ("masks/val/scene_00001_00.png", b"\x89PNG\r\n\x1a\n cut", "12 bytes are no label PNG"),
+        ("manifest.json", b'{"kind": ', "is no JSON"),
+        ("manifest.json", b"\xff\xfe", "is no JSON"),
+        ("manifest.json", b"[]", "is no manifest"),
+        ("data.yaml", b"\xff\xfe\x00", "no data.yaml"),
+    ],
+)
+def test_damaged_files_are_named_with_what_to_do(tmp_path, file, data, says):
+    folder = flat_set(tmp_path / "rooms", train=1, val=1)
+    (folder / file).write_bytes(data)
+    with pytest.raises(DatasetError, match=says) as caught:
+        read_pair(read_training_set(folder).of("val")[0], len(NAMES))
+    assert caught.value.where == str(folder / file)
+    assert "make the set again" in caught.value.hint
+
+
+def test_a_label_png_of_colours_or_cut_short_is_refused(tmp_path):
+    found = read_training_set(flat_set(tmp_path / "rooms", train=1, val=1))
+    (pair,) = found.of("val")
+    pair[1].write_bytes(pair[1].read_bytes()[:-200])
+    with pytest.raises(DatasetError, match="no label PNG"):
+        read_pair(pair, len(NAMES))
+    Image.new("RGB", (128, 96)).save(pair[1])
+    with pytest.raises(DatasetError, match="PNG of colours"):
+        read_pair(pair, len(NAMES))
 
 
 def test_labels_that_do_not_fit_are_refused(tmp_path):

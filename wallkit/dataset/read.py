@@ -56,13 +56,13 @@ def read_training_set(folder: Path) -> TrainingSet:
     """What `wallkit simulate dataset` and `wallkit dataset from-log` write.
 
     Raises:
-        DatasetError: no such folder, no data.yaml in it, no names, or no label PNGs.
+        DatasetError: no such folder, no data.yaml in it, no names, no label PNGs, or a damaged manifest.
     """
     if not (folder / "data.yaml").is_file():
         what = "no data.yaml in this folder" if folder.is_dir() else "no such folder"
         raise DatasetError(what, where=folder, hint="make a training set: wallkit simulate dataset -o rooms")
     manifest = folder / "manifest.json"
-    record = json.loads(manifest.read_text("utf-8")) if manifest.is_file() else {}
+    record = _manifest(manifest) if manifest.is_file() else {}
     table = _table(folder / "data.yaml")
     folders = {split: _folders(folder, table, split) for split in ("train", "val")}
     pairs = {split: tuple(pair for one in own for pair in _pairs(one)) for split, own in folders.items()}
@@ -114,9 +114,9 @@ def read_pair(pair: Pair, classes: int) -> tuple[UInt8Array, UInt8Array]:
     """(H, W, 3) RGB and (H, W) numbers of a picture.
 
     Raises:
-        DatasetError: sizes that differ, or a number that is no class.
+        DatasetError: a damaged file, sizes that differ, or a number that is no class.
     """
-    image, numbers = read_rgb(pair[0]), classes_from_png(pair[1].read_bytes())
+    image, numbers = read_rgb(pair[0]), _numbers(pair[1])
     if image.shape[:2] != numbers.shape:
         sizes = f"{numbers.shape[1]} x {numbers.shape[0]}, its picture {image.shape[1]} x {image.shape[0]}"
         raise DatasetError(f"labels of {sizes}", where=pair[1], hint="make the set again")
@@ -127,6 +127,30 @@ def read_pair(pair: Pair, classes: int) -> tuple[UInt8Array, UInt8Array]:
 
 
 # -------------------------------------------------------------------------------------------- details
+
+
+def _numbers(path: Path) -> UInt8Array:
+    """(H, W) numbers of a label PNG."""
+    data = path.read_bytes()
+    try:
+        numbers = classes_from_png(data)
+    except (OSError, SyntaxError, ValueError) as error:
+        # Pillow has one of these for each way in which a file can be broken
+        hint = "delete it and its picture, or make the set again"
+        raise DatasetError(f"{len(data)} bytes are no label PNG", where=path, hint=hint) from error
+    if numbers.ndim != 2:
+        raise DatasetError("is a PNG of colours, not of class numbers", where=path, hint="make the set again")
+    return numbers
+
+
+def _manifest(path: Path) -> Mapping[str, Any]:
+    try:
+        record = json.loads(path.read_text("utf-8"))
+    except ValueError as error:
+        raise DatasetError(f"is no JSON: {error}", where=path, hint="make the set again, or delete it") from error
+    if not isinstance(record, dict):
+        raise DatasetError("is no manifest of a training set", where=path, hint="make the set again, or delete it")
+    return record
 
 
 def _folders(folder: Path, table: Mapping[str, Any], split: str) -> tuple[Path, ...]:
@@ -161,7 +185,7 @@ def _table(path: Path) -> Mapping[str, Any]:
 
     try:
         table = YAML(typ="safe").load(path.read_text("utf-8"))
-    except YAMLError as error:
+    except (YAMLError, UnicodeDecodeError) as error:
         raise DatasetError("this is no data.yaml", where=path, hint="make the set again") from error
     if not isinstance(table, dict):
         raise DatasetError("this is no data.yaml", where=path, hint="make the set again")
