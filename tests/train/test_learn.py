@@ -92,6 +92,25 @@ def test_an_interrupted_training_is_lost_only_when_asked(tmp_path):
     assert not (tmp_path / ".net.unfinished").exists()
 
 
+def test_a_training_that_fails_before_an_epoch_leaves_nothing(tmp_path, monkeypatch):
+    torch_or_skip()
+    from wallkit.train import learn
+
+    rooms = flat_set(tmp_path / "rooms", train=4, val=2)
+    request = TrainRequest((rooms,), (64, 64), epochs=1)
+
+    def fails(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(learn, "_step", fails)
+    with pytest.raises(KeyboardInterrupt):
+        train_model(request, tmp_path / "net")
+    next((rooms / "images" / "train").iterdir()).write_bytes(b"")
+    with pytest.raises(DatasetError, match="no picture"):
+        train_model(request, tmp_path / "net")
+    assert [path.name for path in tmp_path.iterdir()] == ["rooms"]
+
+
 def test_scores_are_of_all_sets(tmp_path):
     torch_or_skip()
     sets = tuple(flat_set(tmp_path / name, train=2, val=val, seed=val) for name, val in (("rooms", 1), ("more", 3)))
@@ -131,6 +150,9 @@ def test_what_cannot_be_trained_on_is_refused(tmp_path, monkeypatch):
     rooms = flat_set(tmp_path / "rooms", train=2, val=1)
     with pytest.raises(ModelError, match="320 x 200"):
         check_request(TrainRequest((rooms,), (320, 200)), tmp_path / "net", overwrite=False)
+    for rate in (0, -1, float("nan"), 2):
+        with pytest.raises(ModelError, match="a learning rate of"):
+            check_request(TrainRequest((rooms,), rate=rate), tmp_path / "net", overwrite=False)
     other = flat_set(tmp_path / "other", train=2, val=1)
     text = (other / "data.yaml").read_text()
     (other / "data.yaml").write_text(text.replace("door", "gate"))
@@ -167,3 +189,13 @@ def test_the_command_says_what_it_would_do_and_what_is_missing(tmp_path, monkeyp
         main([*words, "--yolo", "yolov8n-seg.yaml", "--python", str(tmp_path / "nowhere")])
     assert done.value.code == 2
     assert "is no program that can be run" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("rate", ["nan", "-1", "0", "2", "inf"])
+def test_a_rate_that_is_none_is_a_usage_error(tmp_path, capsys, rate):
+    from wallkit.cli.app import main
+
+    with pytest.raises(SystemExit) as done:
+        main(["model", "train", str(tmp_path), "--rate", rate, "-o", str(tmp_path / "net")])
+    assert done.value.code == 2
+    assert "not in the range 0<x<=1" in capsys.readouterr().err

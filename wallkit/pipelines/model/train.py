@@ -16,6 +16,7 @@ from wallkit.pipelines.model.unfinished import (
     check_unfinished,
     close_unfinished,
     has_epochs,
+    kept_if_begun,
     open_unfinished,
     unfinished_folder,
 )
@@ -76,9 +77,6 @@ def train_model(
     """
     sets = check_request(request, out, overwrite=overwrite)
     lesson = lesson_of(request)
-    fingerprint = _fingerprint(sets, lesson)
-    working = unfinished_folder(out)
-    checkpoint = open_unfinished(working, fingerprint)
     from wallkit.train.export import export_onnx
     from wallkit.train.learn import learn
     from wallkit.train.network import parameters_of
@@ -88,13 +86,17 @@ def train_model(
     # a quarter larger than the network sees them, so that closer looks are sharp
     train = _pictures(sets, "train", (width + width // 4, height + height // 4))
     val = _pictures(sets, "val", request.size)
+    fingerprint = _fingerprint(sets, lesson)
+    working = unfinished_folder(out)
+    checkpoint = open_unfinished(working, fingerprint)
     fresh: list[int] = []
 
     def hear(epoch: Epoch) -> None:
         fresh.append(epoch.number)
         told(epoch, lesson.epochs)
 
-    learnt = learn(train, val, names, lesson, checkpoint, told=hear)
+    with kept_if_begun(working):
+        learnt = learn(train, val, names, lesson, checkpoint, told=hear)
     parameters = parameters_of(learnt.net)
     about = _about(sets, scores_of(learnt.matrix, names), parameters)
     exported = export_onnx(learnt.net, names, lesson.size, working / "model.onnx", about=about)
@@ -133,6 +135,8 @@ def check_request(request: TrainRequest, out: Path, *, overwrite: bool) -> tuple
             width, height = request.size
             hint = f"--size 256x192; sides are multiples of {_MULTIPLE} from 64 to 1280"
             raise ModelError(f"a network for pictures of {width} x {height}", hint=hint)
+    if request.rate is not None and not 0 < request.rate <= 1:
+        raise ModelError(f"a learning rate of {request.rate:g}", hint="--rate 0.003; above 0, at most 1")
     sets = read_training_sets(request.datasets)
     check_libraries()
     working = unfinished_folder(out)
@@ -160,16 +164,9 @@ def lesson_of(request: TrainRequest) -> Lesson:
     """The request as settings of the training."""
     from wallkit.train.learn import Lesson
 
-    usual = Lesson()
-    return replace(
-        usual,
-        size=request.size,
-        epochs=request.epochs or usual.epochs,
-        batch=request.batch or usual.batch,
-        rate=request.rate or usual.rate,
-        threads=request.threads,
-        seed=request.seed,
-    )
+    asked = {"epochs": request.epochs, "batch": request.batch, "rate": request.rate}
+    given: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
+    return replace(Lesson(), size=request.size, threads=request.threads, seed=request.seed, **given)
 
 
 # -------------------------------------------------------------------------------------------- details

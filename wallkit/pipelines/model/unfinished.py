@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,17 @@ def open_unfinished(working: Path, wanted: Mapping[str, Any]) -> Path:
         working.mkdir(parents=True)
         write_json(working / _REQUEST, dict(wanted))
     return working / _CHECKPOINT
+
+
+@contextmanager
+def kept_if_begun(working: Path) -> Iterator[None]:
+    """Deletes the folder when the block fails before there is an epoch to go on from."""
+    try:
+        yield
+    except BaseException:
+        if not has_epochs(working):
+            shutil.rmtree(working, ignore_errors=True)
+        raise
 
 
 def close_unfinished(working: Path) -> None:
