@@ -13,6 +13,7 @@ import pytest
 from tests.maps.random_maps import clean_map
 from tests.simulate.conftest import gl
 from wallkit.dataset.labels import classes_from_png
+from wallkit.dataset.read import pairs_of, read_training_sets
 from wallkit.evaluate.tum import read_tum
 
 __all__ = ["gl"]
@@ -91,7 +92,9 @@ def test_logs_become_a_dataset_after_a_review(logs, tmp_path, wallkit):
         assert groups == {name for name, where in said["splits"].items() if where == split}
     train = len(list((out / "images/train").iterdir()))
     assert said["augmented"] == len(list((out / "augmented/images/train").iterdir())) == 2 * train
-    assert "val: ../images/val" in (out / "augmented/data.yaml").read_text()
+    plain, other = read_training_sets((out, out / "augmented"))
+    assert other.of("val") == plain.of("val")
+    assert len(pairs_of((plain, other), "all")) == 17 + 2 * train
 
 
 def test_poses_scans_and_labels_are_those_of_the_log(logs, tmp_path, wallkit):

@@ -124,6 +124,8 @@ def test_quantize_writes_what_still_sees_and_nothing_else(wallkit, tmp_path, pic
     assert wallkit("model", "fixture", "stuff.onnx", "--imgsz", "192x320", "--layout", "class-scores").code == 0
     words = ("model", "quantize", "stuff.onnx", "--images", pictures)
     assert "would calibrate and judge with 2 pictures and write stuff-int8.onnx" in wallkit(*words, "--dry-run").out
+    done = wallkit("model", "quantize", "nofile.onnx", "--images", pictures, "--dry-run")
+    assert (done.code, "nofile.onnx" in done.err, done.out) == (2, True, "")
     done = wallkit(*words, "--json")
     assert done.code == 0, done.err
     assert (done.json["written"], done.json["judged_by_calibration_pictures"], done.json["match_share"]) == (

@@ -50,8 +50,8 @@ def asked(tmp_path):
         root, noted = str(Path(package.__file__).parents[1]), str(tmp_path / "noted.json")
         python.write_text(STAND_IN.format(python=sys.executable, root=root, noted=noted, fault=fault))
         python.chmod(0o755)
-        usual = {"size": (192, 320), "python": python}
-        return ExportRequest(tmp_path / "best.pt", tmp_path / "out.onnx", **{**usual, **words})
+        usual = {"out": tmp_path / "out.onnx", "size": (192, 320), "python": python}
+        return ExportRequest(tmp_path / "best.pt", **{**usual, **words})
 
     return make
 
@@ -108,6 +108,14 @@ def test_a_size_that_would_be_rounded_is_refused_before(asked):
     with pytest.raises(ModelError, match="300x320 is not in steps of 32") as caught:
         export_model(asked(size=(300, 320)), SegmentSettings())
     assert caught.value.hint == "--imgsz 288x320"
+
+
+@pytest.mark.parametrize("name", ["best.json", "best", "best.pt"])
+def test_an_output_that_its_record_or_a_reader_would_take_for_another_file_is_refused(tmp_path, asked, name):
+    with pytest.raises(ModelError, match=f"'{name}' is no name of an ONNX file") as caught:
+        export_model(asked(out=tmp_path / name), SegmentSettings())
+    assert caught.value.hint.startswith(f"--out {tmp_path / 'best.onnx'}")
+    assert (tmp_path / "best.pt").read_bytes() == b"weights"
 
 
 def test_a_missing_checkpoint_and_one_that_is_none(tmp_path, asked):

@@ -10,6 +10,8 @@ from wallkit.errors import ModelError
 from wallkit.segment.inspection import anchors_of, inspect_model
 from wallkit.segment.layouts import LAYOUTS
 from wallkit.segment.onnx_graph import read_graph
+from wallkit.segment.roles import Roles
+from wallkit.segment.settings import SegmentSettings
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
@@ -44,6 +46,15 @@ def test_a_model_that_says_nothing_about_itself_is_noted(tmp_path):
     notes = " ".join(inspect_model(path).notes)
     for words in ("names no classes", "names no licence", "no class counts as anything"):
         assert words in notes
+
+
+def test_words_that_no_class_is_called_are_noted(tmp_path):
+    path = colour_oracle(tmp_path).model.path
+    listed = Roles(wall=("Wall", "doro"), movable=("sink", "fridge"))
+    assert inspect_model(path, SegmentSettings(roles=listed)).notes == (
+        "segment.roles.wall lists 'doro', which none of its classes is called: did you mean 'door'?",
+        "segment.roles.movable lists 'fridge', which none of its classes is called",
+    )
 
 
 def test_anchors_of_the_usual_sizes():

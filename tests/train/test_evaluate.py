@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from tests.train.flat import NAMES, flat_set
+from wallkit.dataset.read import read_training_sets
 from wallkit.errors import ModelError
-from wallkit.pipelines.model.evaluate import NOTHING, evaluate_model, minimum_of
+from wallkit.pipelines.model.evaluate import NOTHING, evaluate_model, evaluate_on, minimum_of
 from wallkit.segment.fixture import USUAL, oracle
 
 
@@ -38,6 +39,17 @@ def test_an_oracle_is_right_about_every_class(tmp_path, rooms):
     assert judged.without == ()
     assert (tmp_path / "sheet.png").stat().st_size > 10_000
     assert judged.document["classes"]["wall"]["mistaken"]["share"] < 0.1
+
+
+def test_several_sets_are_judged_as_one(tmp_path, rooms):
+    """Pixels are pooled: the confusion matrices of the sets add up."""
+    more = flat_set(tmp_path / "more", train=1, val=3, seed=9)
+    path = model(tmp_path, USUAL)
+    sets = read_training_sets((rooms, more))
+    judged = evaluate_on(sets, path, "val", sheet=tmp_path / "sheet.png")
+    apart = [evaluate_model(path, one, "val") for one in (rooms, more)]
+    assert judged.pictures == 6 + 3
+    np.testing.assert_array_equal(judged.matrix, sum(one.matrix for one in apart))
 
 
 def test_two_classes_exchanged_are_never_found(tmp_path, rooms):
@@ -102,3 +114,23 @@ def test_the_command_prints_a_table_and_judges(tmp_path, rooms, capsys):
     assert done.value.code == 1
     assert document["short"]["wall"][1] == 1.0
     assert document["classes"]["toilet"]["iou"] > 0.8
+
+
+def test_a_sheet_that_cannot_be_written_is_said_before_the_run(tmp_path, rooms, monkeypatch, capsys):
+    from wallkit.cli.app import main
+    from wallkit.pipelines.model import evaluate
+
+    path, mine = str(model(tmp_path, USUAL)), tmp_path / "mine.png"
+    mine.write_bytes(b"mine")
+    with monkeypatch.context() as patched:
+        patched.setattr(evaluate, "evaluate_model", lambda *_, **__: pytest.fail("it ran"))
+        for sheet, says in ((mine, "exists"), (tmp_path / "no" / "m.png", "its folder does not exist")):
+            with pytest.raises(SystemExit) as done:
+                main(["model", "evaluate", path, str(rooms), "--sheet", str(sheet), "-q"])
+            assert done.value.code == 2
+            assert says in capsys.readouterr().err
+    assert mine.read_bytes() == b"mine"
+    with pytest.raises(SystemExit) as done:
+        main(["model", "evaluate", path, str(rooms), "--sheet", str(mine), "--overwrite", "-q"])
+    assert done.value.code == 0
+    assert mine.read_bytes().startswith(b"\x89PNG")

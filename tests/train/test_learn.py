@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.train.flat import NAMES, flat, flat_set
-from wallkit.errors import DatasetError, ModelError
+from wallkit.errors import DatasetError, ModelError, OutputError
 from wallkit.pipelines.model import train as model_train
 from wallkit.pipelines.model.train import TrainRequest, check_request, train_model
 
@@ -67,6 +67,58 @@ def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(tmp_path):
         torch.testing.assert_close(a, b)
 
 
+def test_an_interrupted_training_is_lost_only_when_asked(tmp_path):
+    torch_or_skip()
+    rooms = flat_set(tmp_path / "rooms", train=4, val=2)
+    request = TrainRequest((rooms,), (64, 64), epochs=2, batch=4)
+
+    def stop(epoch, of):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train_model(request, tmp_path / "net", told=stop)
+    kept = (tmp_path / ".net.unfinished" / "checkpoint.pt").read_bytes()
+    other = replace(request, epochs=3, seed=7)
+    for act in (check_request, train_model):
+        with pytest.raises(OutputError, match="other settings: epochs 2, now 3; seed 0, now 7") as caught:
+            act(other, tmp_path / "net", overwrite=False)
+        assert "--overwrite" in caught.value.hint
+    assert (tmp_path / ".net.unfinished" / "checkpoint.pt").read_bytes() == kept
+    check_request(other, tmp_path / "net", overwrite=True)
+    # the machine is no part of what is learnt
+    done = train_model(replace(request, threads=2), tmp_path / "net")
+    assert done.resumed == 1
+    assert json.loads((tmp_path / "net" / "run.json").read_text())["threads"] == 2
+    assert not (tmp_path / ".net.unfinished").exists()
+
+
+def test_a_training_that_fails_before_an_epoch_leaves_nothing(tmp_path, monkeypatch):
+    torch_or_skip()
+    from wallkit.train import learn
+
+    rooms = flat_set(tmp_path / "rooms", train=4, val=2)
+    request = TrainRequest((rooms,), (64, 64), epochs=1)
+
+    def fails(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(learn, "_step", fails)
+    with pytest.raises(KeyboardInterrupt):
+        train_model(request, tmp_path / "net")
+    next((rooms / "images" / "train").iterdir()).write_bytes(b"")
+    with pytest.raises(DatasetError, match="no picture"):
+        train_model(request, tmp_path / "net")
+    assert [path.name for path in tmp_path.iterdir()] == ["rooms"]
+
+
+def test_scores_are_of_all_sets(tmp_path):
+    torch_or_skip()
+    sets = tuple(flat_set(tmp_path / name, train=2, val=val, seed=val) for name, val in (("rooms", 1), ("more", 3)))
+    done = train_model(TrainRequest(sets, (64, 64), epochs=1, batch=4), tmp_path / "net")
+    assert done.judged.pictures == 4
+    assert json.loads((tmp_path / "net" / "scores.json").read_text())["pictures"] == 4
+
+
 def test_training_writes_a_model_that_is_used_like_any_other(tmp_path):
     torch_or_skip()
     from wallkit.segment.onnx_segmenter import load_segmenter
@@ -98,6 +150,9 @@ def test_what_cannot_be_trained_on_is_refused(tmp_path, monkeypatch):
     rooms = flat_set(tmp_path / "rooms", train=2, val=1)
     with pytest.raises(ModelError, match="320 x 200"):
         check_request(TrainRequest((rooms,), (320, 200)), tmp_path / "net", overwrite=False)
+    for rate in (0, -1, float("nan"), 2):
+        with pytest.raises(ModelError, match="a learning rate of"):
+            check_request(TrainRequest((rooms,), rate=rate), tmp_path / "net", overwrite=False)
     other = flat_set(tmp_path / "other", train=2, val=1)
     text = (other / "data.yaml").read_text()
     (other / "data.yaml").write_text(text.replace("door", "gate"))
@@ -116,6 +171,7 @@ def test_missing_libraries_are_named(monkeypatch):
     with pytest.raises(ModelError, match="torch and onnx") as caught:
         model_train.check_libraries()
     assert "wallkit[train]" in caught.value.hint
+    assert "+cpu" not in caught.value.hint
 
 
 def test_the_command_says_what_it_would_do_and_what_is_missing(tmp_path, monkeypatch, capsys):
@@ -130,6 +186,16 @@ def test_the_command_says_what_it_would_do_and_what_is_missing(tmp_path, monkeyp
     assert "trained on 3 pictures, judged on 2 others" in capsys.readouterr().out
     assert not (tmp_path / "net").exists()
     with pytest.raises(SystemExit) as done:
-        main([*words, "--yolo", "yolov8n-seg.yaml"])
+        main([*words, "--yolo", "yolov8n-seg.yaml", "--python", str(tmp_path / "nowhere")])
     assert done.value.code == 2
-    assert "which interpreter has Ultralytics?" in capsys.readouterr().err
+    assert "is no program that can be run" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("rate", ["nan", "-1", "0", "2", "inf"])
+def test_a_rate_that_is_none_is_a_usage_error(tmp_path, capsys, rate):
+    from wallkit.cli.app import main
+
+    with pytest.raises(SystemExit) as done:
+        main(["model", "train", str(tmp_path), "--rate", rate, "-o", str(tmp_path / "net")])
+    assert done.value.code == 2
+    assert "not in the range 0<x<=1" in capsys.readouterr().err

@@ -16,7 +16,9 @@ def dataset() -> None:
 
 @dataset.command("from-log")
 @click.argument("logs", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="LOG...")
-@click.option("--image", "image_topic", default="", metavar="TOPIC", help="Only this camera; else all of them.")
+@click.option(
+    "--image", "image_topics", multiple=True, metavar="TOPIC", help="Only this camera (repeatable); else all of them."
+)
 @click.option(
     "--run",
     "runs",
@@ -44,7 +46,7 @@ def dataset() -> None:
 @common.quiet_option
 def from_log(
     logs: tuple[Path, ...],
-    image_topic: str,
+    image_topics: tuple[str, ...],
     runs: tuple[Path, ...],
     review: bool,
     drops: Path | None,
@@ -74,7 +76,7 @@ def from_log(
 
     labels = read_label_set(classes)
     out = out or Path("dataset")
-    request = FromLogs(logs, image_topic, runs, drops, review, denoise, augment, val, seed, labels)
+    request = FromLogs(logs, image_topics, runs, drops, review, denoise, augment, val, seed, labels)
     with common.progress("pictures", None, quiet=quiet) as update:
         done = dataset_from_logs(request, out, overwrite=overwrite, progress=update)
     if as_json:

@@ -27,6 +27,7 @@ from wallkit.dataset.labels import (
     things_of,
 )
 from wallkit.dataset.sheet import Tile, contact_sheet
+from wallkit.errors import DatasetError
 
 _SHEET_TILES = 48
 
@@ -122,11 +123,18 @@ def jpeg_from_rgb(pixels: UInt8Array, quality: int) -> bytes:
 
 
 def read_rgb(path: Path) -> UInt8Array:
-    """(H, W, 3) RGB of a picture file."""
+    """(H, W, 3) RGB of a picture file.
+
+    Raises:
+        DatasetError: it is damaged, or not there.
+    """
     import cv2
 
-    pixels = cv2.imread(str(path), cv2.IMREAD_COLOR)
-    assert pixels is not None, path
+    data = np.frombuffer(path.read_bytes() if path.is_file() else b"", np.uint8)
+    pixels = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
+    if pixels is None:
+        hint = "delete it and its label PNG, or make the set again"
+        raise DatasetError(f"{data.size} bytes are no picture", where=path, hint=hint)
     return np.ascontiguousarray(pixels[..., ::-1], dtype=np.uint8)
 
 

@@ -10,7 +10,7 @@ which is which.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 
 from wallkit.errors import LogError, closest
@@ -48,6 +48,8 @@ TRANSFORM_KINDS = (
 )
 # what a simulator knows and no robot does
 ORACLE = "/oracle/"
+# what ROS' image_transport appends to the topic of the same images
+_COMPRESSED = "/compressed"
 _TRUTH_WORDS = {"truth", "groundtruth", "gt"}
 _PEEK = 20
 
@@ -145,6 +147,16 @@ def is_truth_name(topic: str) -> bool:
 def is_picture_name(topic: str) -> bool:
     """Whether a topic of images holds what a camera saw, by its name."""
     return "depth" not in topic.lower() and not topic.startswith(ORACLE)
+
+
+def is_copy(topic: str, held: Container[str]) -> bool:
+    """Whether another topic has the same pixels: the raw one of its own, or the compressed one if there are no raw ones.
+
+    Args:
+        held: topics that hold images.
+    """
+    raw = topic.removesuffix(_COMPRESSED)
+    return raw in held if raw != topic else topic not in held and topic + _COMPRESSED in held
 
 
 def camera_of_topic(topic: str) -> str:

@@ -17,15 +17,13 @@ from wallkit.logs.images import pixels_from_image
 from wallkit.logs.message import Message
 from wallkit.logs.reader import Log
 from wallkit.logs.rig import CameraTopic
-from wallkit.logs.topics import IMAGE_KINDS, ORACLE, camera_of_topic, is_picture_name
+from wallkit.logs.topics import IMAGE_KINDS, ORACLE, camera_of_topic, is_copy, is_picture_name
 from wallkit.points.project import check_usable
 
 # the model that asks the simulator, instead of looking
 ORACLE_MODEL = "oracle"
 # images that tell how often they come
 _FIRST = 12
-# what ROS' image_transport appends to the topic of the same images
-_COMPRESSED = "/compressed"
 # intrinsics that differ more are of another camera or mode
 _SAME_FOCAL = 0.02
 
@@ -163,7 +161,7 @@ def _topic_of(log: Log, known: Sequence[str], calibration: Calibration, path: Pa
         return exact[0]
     frames = {topic: message.value.frame_id for topic in known for message in log.first(topic)
               if isinstance(message.value, CameraImage)}  # fmt: skip
-    topics = [t for t in known if not _is_copy(t, frames)]
+    topics = [t for t in known if not is_copy(t, frames)]
     if name:
         found = [t for t in topics if _name_of(t) == name]
         if not found:
@@ -181,16 +179,6 @@ def _topic_of(log: Log, known: Sequence[str], calibration: Calibration, path: Pa
     listed = ", ".join(f"{_name_of(t)} ({t}, frame {frames.get(t) or '(none)'})" for t in topics)
     hint = f"say which it is, for example --camera {_name_of(topics[0])}"
     raise CalibrationError(f"{said} is not in the log: {listed}", where=path, hint=hint)
-
-
-def _is_copy(topic: str, frames: Mapping[str, str]) -> bool:
-    """Whether another topic has the same pixels: the raw one of its own, or the compressed one if there are no raw ones.
-
-    Args:
-        frames: of the topics that hold images.
-    """
-    raw = topic.removesuffix(_COMPRESSED)
-    return raw in frames if raw != topic else topic not in frames and topic + _COMPRESSED in frames
 
 
 def _only(found: Sequence[str], log: Log, whose: str, frames: Mapping[str, str]) -> str:

@@ -81,7 +81,7 @@ def check_file_out(out: Path, *, overwrite: bool) -> None:
     if out.is_dir():
         raise OutputError("is a folder, not a file", where=out, hint="give the name of a file")
     if out.exists() and not overwrite:
-        raise OutputError("exists", where=out, hint="choose another --out, or pass --overwrite to replace it")
+        raise OutputError("exists", where=out, hint="choose another name, or pass --overwrite to replace it")
     if not out.absolute().parent.is_dir():
         raise OutputError("cannot be written: its folder does not exist", where=out, hint=f"mkdir -p {out.parent}")
 

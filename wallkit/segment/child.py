@@ -19,7 +19,8 @@ SETUP = """\
 # an environment of its own: Ultralytics is AGPL-3.0 and wants packages that wallkit does not (1.3 GB, half a minute)
 python3 -m venv yv
 yv/bin/pip install torch==2.13.0 numpy==2.4.6 opencv-contrib-python-headless==4.13.0.92 pillow==13.0.0 \\
-    pyyaml==6.0.3 onnx==1.23.2 onnxruntime==1.27.0 onnxslim==0.1.98
+    pyyaml==6.0.3 onnx==1.23.2 onnxruntime==1.27.0 onnxslim==0.1.98 \\
+    matplotlib==3.11.2 polars==2.1.0 psutil==7.2.2    # of this line: only `wallkit model train --yolo`
 yv/bin/pip install --no-deps ultralytics==8.4.190 torchvision==0.28.0
 """
 _SCRIPT = Path(__file__).with_name("child_script.py")

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 
+from wallkit.core.segmentation import BACKGROUND
 from wallkit.segment.model_file import Size, Tensor, shape_words
 from wallkit.segment.onnx_graph import GraphFacts, read_graph
 from wallkit.segment.onnx_segmenter import OnnxSegmenter, load_segmenter
@@ -109,4 +111,15 @@ def _notes(segmenter: OnnxSegmenter, graph: GraphFacts) -> list[str]:
         notes.append("AGPL-3.0 holds for the weights too: do not ship it in a product that is not")
     if all(role in ("other", "background") for role in segmenter.roles):
         notes.append("no class counts as anything: list its words under [segment.roles] in wallkit.toml")
-    return notes
+    return [*notes, *_unused_words(segmenter)]
+
+
+def _unused_words(segmenter: OnnxSegmenter) -> list[str]:
+    """Words under [segment.roles] that do nothing with this model: of another model, or typing errors."""
+    names = [name for name in segmenter.names if name != BACKGROUND]
+    found = []
+    for role, word in segmenter.settings.roles.unused(names):
+        near = get_close_matches(word, names, n=1)
+        meant = f": did you mean '{near[0]}'?" if near else ""
+        found.append(f"segment.roles.{role} lists '{word}', which none of its classes is called{meant}")
+    return found

@@ -77,6 +77,13 @@ class Roles:
         listed = {**_COMMON_ROLES, **self._own()}
         return tuple(BACKGROUND if n == BACKGROUND else listed.get(_plain(n), OTHER) for n in names)
 
+    def unused(self, names: Sequence[str]) -> tuple[tuple[str, str], ...]:
+        """(role, word) of the words listed here that none of the classes is called, as they are written."""
+        called = {_plain(name) for name in names}
+        return tuple(
+            (role, word) for role in self.names() for word in getattr(self, role) if _plain(word) not in called
+        )
+
     @staticmethod
     def names() -> tuple[str, ...]:
         """Of all roles that a table can list."""

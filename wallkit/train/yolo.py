@@ -19,10 +19,7 @@ from wallkit.train.curves import Epoch
 
 # offline, and without changing the environment it runs in
 ENVIRONMENT: Mapping[str, str] = {"YOLO_OFFLINE": "1", "YOLO_AUTOINSTALL": "0", "YOLO_VERBOSE": "True"}
-SETUP = """python3 -m venv yv
-yv/bin/pip install torch==2.13.0+cpu numpy opencv-contrib-python-headless pillow pyyaml psutil polars matplotlib
-yv/bin/pip install onnx onnxruntime onnxslim
-yv/bin/pip install --no-deps ultralytics==8.4.190 torchvision==0.28.0"""
+SETUP_HINT = "`wallkit model export --print-setup` prints the commands that make one"
 
 # beside a PyTorch for the CPU the usual torchvision cannot load its own operators; training needs one of them
 _CHILD = """
@@ -77,6 +74,7 @@ class YoloLesson:
 
     Attributes:
         start: a checkpoint, or a model's .yaml to begin from nothing. size: width, height of the exported network.
+        is_trusting: checkpoints are pickles, which can run anything; else only plain weights are loaded.
     """
 
     start: str = "yolov8n-seg.yaml"
@@ -85,15 +83,21 @@ class YoloLesson:
     size: tuple[int, int] = (320, 256)
     threads: int = 1
     seed: int = 0
+    is_trusting: bool = False
 
 
 def command(python: str, data: Path, folder: Path, lesson: YoloLesson) -> list[str]:
     """The child's command line: an interpreter, a program, and one JSON argument."""
     width, height = lesson.size
-    asked = {key: value for key, value in asdict(lesson).items() if key != "size"}
+    asked = {key: value for key, value in asdict(lesson).items() if key not in ("size", "is_trusting")}
     places = {"data": str(data.absolute()), "folder": str(folder.absolute())}
     sizes = {"imgsz": max(width, height), "export_size": [height, width]}
     return [python, "-c", _CHILD, json.dumps({**asked, **places, **sizes})]
+
+
+def environment(lesson: YoloLesson) -> dict[str, str]:
+    """The child's: offline, installing nothing, and loading only weights unless the checkpoint is trusted."""
+    return {**os.environ, **ENVIRONMENT, "ULTRALYTICS_SAFE_LOAD": "0" if lesson.is_trusting else "1"}
 
 
 def train_yolo(
@@ -107,14 +111,13 @@ def train_yolo(
     Raises:
         ModelError: the interpreter cannot be started, has no Ultralytics, or the training fails.
     """
-    setup = "set one up:\n" + SETUP
     try:
         child = subprocess.Popen(
             command(python, data, folder, lesson), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-            env={**os.environ, **ENVIRONMENT}, errors="replace",
+            env=environment(lesson), errors="replace",
         )  # fmt: skip
     except OSError as error:
-        raise ModelError(f"cannot be started ({error.strerror})", where=python, hint=setup) from error
+        raise ModelError(f"cannot be started ({error.strerror})", where=python, hint=SETUP_HINT) from error
     lines: list[str] = []
     assert child.stdout is not None
     with child:
@@ -126,9 +129,7 @@ def train_yolo(
             child.terminate()
             raise
     if child.returncode:
-        missing = any("No module named 'ultralytics'" in line for line in lines)
-        said = "has no Ultralytics" if missing else f"training ended with {child.returncode}: " + "\n".join(lines[-8:])
-        raise ModelError(said, where=python, hint=setup if missing else "the lines above are the child's own")
+        raise _failure(python, child.returncode, lines)
     found = folder / "train" / "weights" / "best.pt", folder / "train" / "weights" / "best.onnx"
     for path in found:
         if not path.is_file():
@@ -146,6 +147,15 @@ def epochs_of(results: str) -> tuple[Epoch, ...]:
     if not rows or "epoch" not in rows[0]:
         raise ModelError("this is no results.csv of Ultralytics", hint="train with Ultralytics 8.4.100 or later")
     return tuple(_epoch(row) for row in rows)
+
+
+def _failure(python: str, code: int, lines: list[str]) -> ModelError:
+    if any("No module named 'ultralytics'" in line for line in lines):
+        return ModelError("has no Ultralytics", where=python, hint=SETUP_HINT)
+    hint = "the lines above are the child's own"
+    if any(word in line for word in ("weights_only", "SAFE_LOAD", "UnpicklingError") for line in lines):
+        hint = "the checkpoint holds more than weights; if you know who made it, pass --trust"
+    return ModelError(f"training ended with {code}: " + "\n".join(lines[-8:]), where=python, hint=hint)
 
 
 def _epoch(row: Mapping[str, str]) -> Epoch:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     metavar="CLASS=IOU",
     help="Exit 1 if a class is found less well (repeatable).",
 )
+@common.overwrite_option
 @common.config_option
 @common.set_option
 @common.json_option
@@ -39,6 +40,7 @@ def evaluate(
     split: str,
     sheet: Path | None,
     required: tuple[str, ...],
+    overwrite: bool,
     config_path: Path | None,
     words: tuple[str, ...],
     as_json: bool,
@@ -57,7 +59,10 @@ def evaluate(
     """
     from wallkit.pipelines.config import load_config
     from wallkit.pipelines.model.evaluate import evaluate_model, minimum_of
+    from wallkit.pipelines.outputs import check_file_out
 
+    if sheet is not None:
+        check_file_out(sheet, overwrite=overwrite)
     least = dict(minimum_of(text) for text in required)
     settings = load_config(config_path, words).config.segment
     with common.progress("pictures", None, quiet=quiet) as update:

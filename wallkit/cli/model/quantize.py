@@ -53,12 +53,13 @@ def quantize(ctx: click.Context, /, model: Path, **flags: Any) -> None:
       wallkit model quantize best.onnx --images log.mcap --to fp16
     """
     from wallkit.pipelines.config import load_config
-    from wallkit.pipelines.model.quantize import quantise_model
+    from wallkit.pipelines.model.quantize import check_model, quantise_model
     from wallkit.pipelines.outputs import check_file_out
 
     out = flags["out"] or model.with_name(f"{model.stem}-{flags['kind']}.onnx")
     check_file_out(out, overwrite=flags["overwrite"])
     settings = load_config(flags["config_path"], flags["words"]).config.segment
+    check_model(model, settings)
     pictures = pictures_from_flags(flags["images"], flags)
     if flags["dry_run"]:
         click.echo(f"would calibrate and judge with {len(pictures)} pictures and write {out}")

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from wallkit.cli import common
+from wallkit.cli.model.words import FiniteRange
 
 if TYPE_CHECKING:
     from wallkit.train.curves import Epoch
@@ -20,38 +21,30 @@ if TYPE_CHECKING:
 )
 @click.option("--epochs", type=click.IntRange(1), metavar="N", help="Passes; else 30 (YOLO: 50).")
 @click.option("--batch", type=click.IntRange(1), metavar="N", help="Pictures in a step; else 8 (YOLO: 16).")
-@click.option("--rate", type=float, metavar="X", help="Highest learning rate; else 0.003.")
+@click.option("--rate", type=FiniteRange(0, 1, min_open=True), metavar="X", help="Highest learning rate; else 0.003.")
 @click.option("--threads", type=click.IntRange(1, 256), default=1, show_default=True, help="Of PyTorch: free cores.")
 @click.option("--yolo", metavar="MODEL", help="YOLO-seg instead: yolov8n-seg.yaml, or a checkpoint to go on from.")
-@click.option("--python", "python", metavar="FILE", help="The interpreter that has Ultralytics, for --yolo.")
+@click.option(
+    "--python",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="For --yolo: interpreter with Ultralytics; else WALLKIT_YOLO_PYTHON, or yolo's.",
+)
+@click.option("--trust", is_flag=True, help="For --yolo: load all that the checkpoint holds; it may run anything.")
 @common.seed_option
 @common.out_option
 @common.overwrite_option
 @common.dry_run_option
 @common.json_option
 @common.quiet_option
-def train(
-    datasets: tuple[Path, ...],
-    size: tuple[int, int],
-    epochs: int | None,
-    batch: int | None,
-    rate: float | None,
-    threads: int,
-    yolo: str | None,
-    python: str | None,
-    seed: int,
-    out: Path | None,
-    overwrite: bool,
-    dry_run: bool,
-    as_json: bool,
-    quiet: bool,
-) -> None:
+def train(datasets: tuple[Path, ...], **flags: Any) -> None:
     """Train a segmentation model on training sets: wallkit's own network, from nothing, by PyTorch.
 
     Writes model.onnx, losses and overlaps by epoch (curves.csv, curves.png), scores.json and masks.png. Stopped with
     Ctrl-C, it goes on when started again. Needs pip install 'wallkit[train]'; a GPU is used if there is one.
 
-    With --yolo, Ultralytics trains YOLO-seg in another interpreter; its models are under AGPL-3.0.
+    With --yolo, Ultralytics trains YOLO-seg in another interpreter, at a rate of its own choice, and loads only weights
+    from a checkpoint unless --trust; its models are under AGPL-3.0.
 
     \b
     Examples:
@@ -59,27 +52,47 @@ def train(
       wallkit model train rooms more-rooms --epochs 60 --threads 2 -o net
       wallkit model train rooms --yolo yolov8n-seg.yaml --python yv/bin/python -o yolo
     """
-    out = out or Path("model")
-    if yolo:
-        _yolo(datasets, size, epochs, batch, threads, yolo, python, seed, out, overwrite, dry_run, as_json, quiet)
-        return
+    out = flags["out"] or Path("model")
+    _check_flags(flags)
+    if flags["yolo"]:
+        _yolo(datasets, out, flags)
+    else:
+        _own(datasets, out, flags)
+
+
+# ------------------------------------------------------------------------------------------------ details
+
+
+def _check_flags(flags: dict[str, Any]) -> None:
+    """Refuse what the chosen way of training would not heed."""
+    if flags["yolo"] and flags["rate"] is not None:
+        raise click.UsageError("--rate is of wallkit's own network: with --yolo, Ultralytics chooses it; leave it out")
+    if not flags["yolo"] and (flags["python"] or flags["trust"]):
+        given = "--python" if flags["python"] else "--trust"
+        raise click.UsageError(f"{given} is for --yolo: name a model or checkpoint with --yolo, or leave it out")
+
+
+def _own(datasets: tuple[Path, ...], out: Path, flags: dict[str, Any]) -> None:
+    """wallkit's own network, by PyTorch."""
     from wallkit.cli.model.evaluate import evaluation_text
+    from wallkit.dataset.read import pairs_of
     from wallkit.pipelines.model.train import TrainRequest, check_request, train_model
 
-    request = TrainRequest(datasets, size, epochs, batch, rate, threads, seed)
-    if dry_run:
-        sets = check_request(request, out, overwrite=overwrite)
-        train_count, val_count = (sum(len(one.of(split)) for one in sets) for split in ("train", "val"))
+    numbers = {name: flags[name] for name in ("size", "epochs", "batch", "rate", "threads", "seed")}
+    request = TrainRequest(datasets, **numbers)
+    if flags["dry_run"]:
+        sets = check_request(request, out, overwrite=flags["overwrite"])
+        train_count, val_count = (len(pairs_of(sets, split)) for split in ("train", "val"))
         click.echo(f"would write {out}: trained on {train_count} pictures, judged on {val_count} others")
         return
 
     def told(epoch: Epoch, epochs: int) -> None:
-        if not quiet:
+        if not flags["quiet"]:
             losses = f"loss {epoch.train_loss:.3f}, validation {epoch.val_loss:.3f}"
             click.echo(f"epoch {epoch.number} of {epochs}: {losses}, mean IoU {epoch.mean_iou:.3f}", err=True)
 
-    done = train_model(request, out, overwrite=overwrite, told=told)
-    if as_json:
+    done = train_model(request, out, overwrite=flags["overwrite"], told=told)
+    if flags["as_json"]:
         common.emit(
             {
                 "model": done.model,
@@ -98,32 +111,23 @@ def train(
     click.echo(f"look at  {out / 'masks.png'}")
 
 
-def _yolo(
-    datasets: tuple[Path, ...],
-    size: tuple[int, int],
-    epochs: int | None,
-    batch: int | None,
-    threads: int,
-    start: str,
-    python: str | None,
-    seed: int,
-    out: Path,
-    overwrite: bool,
-    dry_run: bool,
-    as_json: bool,
-    quiet: bool,
-) -> None:
+def _yolo(datasets: tuple[Path, ...], out: Path, flags: dict[str, Any]) -> None:
+    """YOLO-seg, by Ultralytics."""
     from wallkit.pipelines.model.train_yolo import YoloRequest, check_yolo, train_yolo_model
 
-    request = YoloRequest(datasets, python or "", start, size, epochs, batch, threads, seed)
-    if dry_run:
-        check_yolo(request, out, overwrite=overwrite)
-        click.echo(f"would write {out}: {start} trained by {python}")
+    numbers = {name: flags[name] for name in ("size", "epochs", "batch", "threads", "seed")}
+    request = YoloRequest(datasets, flags["python"], flags["yolo"], **numbers, is_trusting=flags["trust"])
+    if flags["dry_run"]:
+        interpreter, _ = check_yolo(request, out, overwrite=flags["overwrite"])
+        click.echo(f"would write {out}: {request.start} trained by {interpreter.python}")
         return
-    done = train_yolo_model(
-        request, out, overwrite=overwrite, told=lambda line: None if quiet else click.echo(line, err=True)
-    )
-    if as_json:
+
+    def told(line: str) -> None:
+        if not flags["quiet"]:
+            click.echo(line, err=True)
+
+    done = train_yolo_model(request, out, overwrite=flags["overwrite"], told=told)
+    if flags["as_json"]:
         common.emit({"model": done.model, "epochs": len(done.epochs), "licence": "AGPL-3.0"})
         return
     click.echo(f"model    {done.model} (AGPL-3.0), {done.model.with_suffix('.pt')}")

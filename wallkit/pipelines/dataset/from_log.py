@@ -33,13 +33,14 @@ class FromLogs:
     """What to make of which logs.
 
     Attributes:
+        image_topics: one for each camera to take; none for all of them.
         runs: folders of `wallkit localize`, one for each log, whose poses are taken; else the logs' own truth.
         drops: the list of what to leave out. review: only look: the sheet and the list, no dataset.
         augment: variants of each training picture, in a set of their own.
     """
 
     logs: tuple[Path, ...]
-    image_topic: str = ""
+    image_topics: tuple[str, ...] = ()
     runs: tuple[Path, ...] = ()
     drops: Path | None = None
     review: bool = False
@@ -74,7 +75,7 @@ def dataset_from_logs(
     Raises:
         LogError, DatasetError, OutputError: no images, an unknown class, a drop list that does not fit, no place.
     """
-    sources = sources_of(request.logs, request.image_topic, request.runs)
+    sources = sources_of(request.logs, request.image_topics, request.runs)
     with result_folder(out, overwrite=overwrite) as folder:
         lost: dict[str, int] = {}
         names, found, tiles = _judged(sources, request, lost, progress)

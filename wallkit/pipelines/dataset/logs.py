@@ -19,7 +19,15 @@ from wallkit.errors import DatasetError, LogError
 from wallkit.evaluate.tum import read_tum
 from wallkit.logs.images import pixels_from_image
 from wallkit.logs.reader import Log, open_log
-from wallkit.logs.topics import IMAGE_KINDS, SCAN_KINDS, camera_of_topic, pick_image, pick_truth
+from wallkit.logs.topics import (
+    IMAGE_KINDS,
+    SCAN_KINDS,
+    camera_of_topic,
+    is_copy,
+    is_picture_name,
+    pick_image,
+    pick_truth,
+)
 from wallkit.logs.trajectories import trajectory_of
 from wallkit.pipelines.simulate.camera import NO_CLASS, NO_INSTANCE
 
@@ -30,11 +38,15 @@ _PATIENCE = 16
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """One log, and where its poses come from: a run's folder, else the log's own truth."""
+    """One log, and where its poses come from: a run's folder, else the log's own truth.
+
+    Attributes:
+        image_topics: to take; none for every camera's.
+    """
 
     path: Path
     name: str
-    image_topic: str = ""
+    image_topics: tuple[str, ...] = ()
     run: Path | None = None
 
     @cached_property
@@ -43,19 +55,32 @@ class Source:
 
     @cached_property
     def topics(self) -> tuple[str, ...]:
-        """Of pictures.
+        """Of pictures, one for each camera: of those that hold the same images raw and compressed, the raw ones.
 
         Raises:
-            LogError: there are none, or not the one named.
+            LogError: there are none, not one that is named, or several of one camera.
         """
-        if self.image_topic:
-            channel = pick_image(self.log, self.image_topic)
-            return (channel.topic,) if channel else ()
-        names = [c.topic for c in self.log.channels_of(*IMAGE_KINDS) if not c.topic.startswith(_ORACLE)]
-        found = tuple(dict.fromkeys(name for name in names if "depth" not in name.lower()))
-        if not found:
+        if self.image_topics:
+            channels = [pick_image(self.log, name) for name in self.image_topics]
+            return self._of_one_camera_each([channel.topic for channel in channels if channel])
+        names = dict.fromkeys(c.topic for c in self.log.channels_of(*IMAGE_KINDS) if is_picture_name(c.topic))
+        if not names:
             raise LogError("holds no images", where=self.log.name, hint="`wallkit log info` lists what it holds")
-        return found
+        held = {name for name in names if self.log.first(name)}
+        return self._of_one_camera_each([name for name in names if not is_copy(name, held)])
+
+    def _of_one_camera_each(self, topics: list[str]) -> tuple[str, ...]:
+        """The topics; two of one camera, such as raw and rectified images, would have pictures of the same names."""
+        cameras: dict[str, list[str]] = {}
+        for topic in dict.fromkeys(topics):
+            cameras.setdefault(camera_of_topic(topic), []).append(topic)
+        for camera, own in cameras.items():
+            if len(own) > 1:
+                lines = "".join(f"\n    {topic}" for topic in own)
+                hint = f"name one for each camera, for example --image {own[0]}"
+                said = f"{len(own)} topics have images of the camera '{camera}':{lines}"
+                raise LogError(said, where=self.log.name, hint=hint)
+        return tuple(own[0] for own in cameras.values())
 
     @cached_property
     def poses(self) -> Trajectory | None:
@@ -83,7 +108,7 @@ class Source:
         return []
 
 
-def sources_of(logs: tuple[Path, ...], image_topic: str, runs: tuple[Path, ...]) -> list[Source]:
+def sources_of(logs: tuple[Path, ...], image_topics: tuple[str, ...], runs: tuple[Path, ...]) -> list[Source]:
     """Logs with names of their own.
 
     Raises:
@@ -98,7 +123,7 @@ def sources_of(logs: tuple[Path, ...], image_topic: str, runs: tuple[Path, ...])
         name = "".join(c if c.isalnum() or c == "-" else "-" for c in stem)
         if any(one.name == name for one in found):
             name = f"{name}-{number}"
-        found.append(Source(path, name, image_topic, runs[number] if runs else None))
+        found.append(Source(path, name, image_topics, runs[number] if runs else None))
     return found
 
 

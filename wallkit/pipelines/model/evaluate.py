@@ -12,9 +12,10 @@ import numpy as np
 
 from wallkit.core.types import Int64Array, UInt8Array
 from wallkit.dataset.classes import LabelSet
-from wallkit.dataset.read import read_pair, read_training_set
+from wallkit.dataset.read import TrainingSet, pairs_of, read_pair, read_training_set
 from wallkit.dataset.sheet import Tile, contact_sheet
 from wallkit.errors import ModelError, closest
+from wallkit.pipelines.outputs import write_whole
 from wallkit.segment.onnx_segmenter import OnnxSegmenter, load_segmenter
 from wallkit.segment.roles import OTHER, Roles
 from wallkit.segment.settings import SegmentSettings
@@ -99,11 +100,28 @@ def evaluate_model(
     Raises:
         ModelError: it cannot be used, or shares no class with the set. DatasetError: the set cannot be read.
     """
-    found = read_training_set(dataset)
-    pairs = found.of(split)
+    return evaluate_on((read_training_set(dataset),), model, split, settings, sheet=sheet, progress=progress)
+
+
+def evaluate_on(
+    sets: Sequence[TrainingSet],
+    model: Path,
+    split: str,
+    settings: SegmentSettings | None = None,
+    *,
+    sheet: Path | None = None,
+    progress: Callable[[int], None] = lambda _: None,
+) -> Judged:
+    """As evaluate_model, over the pictures of several sets whose classes agree, pooled.
+
+    Raises:
+        ModelError: see evaluate_model. DatasetError: a picture cannot be read.
+    """
+    names = sets[0].names
+    pairs = pairs_of(sets, split)
     segmenter = load_segmenter(model, settings)
-    table, without = matched(segmenter, found.names)
-    count = len(found.names)
+    table, without = matched(segmenter, names)
+    count = len(names)
     matrix = np.zeros((count + 1, count + 1), dtype=np.int64)
     shown = set(np.linspace(0, len(pairs) - 1, min(len(pairs), 18)).round().astype(int).tolist()) if sheet else set()
     tiles, times = [], []
@@ -122,9 +140,10 @@ def evaluate_model(
             tiles += [Tile(image, f"{pair[0].stem}  labels", truth), Tile(image, "model", _palette(predicted, count))]
         progress(number + 1)
     if sheet is not None:
-        sheet.write_bytes(contact_sheet(tiles, LabelSet(names=found.names), title=f"{model.name} on {dataset.name}"))
+        title = f"{model.name} on {' and '.join(one.folder.name for one in sets)}"
+        write_whole(sheet, contact_sheet(tiles, LabelSet(names=names), title=title))
     total, network = (np.median(np.array(times), axis=0) * 1e3).round(2).tolist()
-    return Judged(found.names, matrix, _scores(matrix, found.names), len(pairs), without, (total, network))
+    return Judged(names, matrix, _scores(matrix, names), len(pairs), without, (total, network))
 
 
 def minimum_of(text: str) -> tuple[str, float]:

@@ -101,12 +101,15 @@ def check_request(request: ExportRequest) -> Interpreter:
     """The interpreter that will do it, everything else checked.
 
     Raises:
-        ModelError: no checkpoint, a size that the exporter would round, or no interpreter.
+        ModelError: no checkpoint, an output that is no .onnx, a size that the exporter would round, or no interpreter.
     """
     if not request.checkpoint.is_file():
         raise ModelError("no such file", where=request.checkpoint, hint="name a checkpoint of Ultralytics, best.pt")
     if request.checkpoint.suffix.lower() not in (".pt", ".pth"):
         raise ModelError("is no checkpoint (.pt)", where=request.checkpoint, hint="an ONNX file needs no export")
+    if request.out.suffix.lower() != ".onnx":
+        hint = f"--out {request.out.with_suffix('.onnx')}; its record goes into the .json beside it"
+        raise ModelError(f"'{request.out.name}' is no name of an ONNX file", where="--out", hint=hint)
     if any(side % _STRIDE for side in request.size):
         nearest = "x".join(str(max(_STRIDE, round(side / _STRIDE) * _STRIDE)) for side in request.size)
         said = f"{request.size[0]}x{request.size[1]} is not in steps of {_STRIDE}: the exporter would round it silently"

@@ -81,6 +81,15 @@ def quantise_model(
     return Quantised(agreement, len(calibrating), len(judging), is_same, kept, *sizes, times, is_good)
 
 
+def check_model(path: Path, settings: SegmentSettings) -> None:
+    """Refuse what cannot be quantised before pictures are read.
+
+    Raises:
+        ModelError: it cannot be loaded, or is no segmentation model.
+    """
+    load_segmenter(path, settings)
+
+
 def _network_ms(segmenter: OnnxSegmenter, pictures: Sequence[Picture]) -> float:
     """Median CPU time of the network."""
     spent = []

@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import json
-import shutil
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import wallkit
-from wallkit.dataset.read import TrainingSet, read_pair, read_training_sets
+from wallkit.dataset.read import TrainingSet, pairs_of, read_pair, read_training_sets
 from wallkit.errors import ModelError
-from wallkit.pipelines.model.evaluate import Judged, evaluate_model
+from wallkit.pipelines.model.evaluate import Judged, evaluate_on
+from wallkit.pipelines.model.unfinished import (
+    check_unfinished,
+    close_unfinished,
+    has_epochs,
+    kept_if_begun,
+    open_unfinished,
+    unfinished_folder,
+)
 from wallkit.pipelines.outputs import check_out, put_in_place
 from wallkit.pipelines.run_folder import write_json
 from wallkit.train.curves import Epoch, csv_of, draw_curves
@@ -60,7 +67,7 @@ def train_model(
 ) -> Trained:
     """A folder with model.onnx, curves.csv and .png, scores.json, masks.png and run.json.
 
-    A run that is interrupted goes on after its last whole epoch when it is started again.
+    A run that is interrupted goes on after its last whole epoch when it is started again, on as many threads as one likes.
 
     Args:
         told: hears of every epoch that is done, and of how many there will be.
@@ -70,12 +77,6 @@ def train_model(
     """
     sets = check_request(request, out, overwrite=overwrite)
     lesson = lesson_of(request)
-    working = out.absolute().with_name(f".{out.name}.unfinished")
-    fingerprint = _fingerprint(sets, lesson)
-    if not _is_of(working, fingerprint):
-        shutil.rmtree(working, ignore_errors=True)
-        working.mkdir(parents=True)
-        write_json(working / "request.json", fingerprint)
     from wallkit.train.export import export_onnx
     from wallkit.train.learn import learn
     from wallkit.train.network import parameters_of
@@ -85,18 +86,21 @@ def train_model(
     # a quarter larger than the network sees them, so that closer looks are sharp
     train = _pictures(sets, "train", (width + width // 4, height + height // 4))
     val = _pictures(sets, "val", request.size)
+    fingerprint = _fingerprint(sets, lesson)
+    working = unfinished_folder(out)
+    checkpoint = open_unfinished(working, fingerprint)
     fresh: list[int] = []
 
     def hear(epoch: Epoch) -> None:
         fresh.append(epoch.number)
         told(epoch, lesson.epochs)
 
-    checkpoint = working / "checkpoint.pt"
-    learnt = learn(train, val, names, lesson, checkpoint, told=hear)
+    with kept_if_begun(working):
+        learnt = learn(train, val, names, lesson, checkpoint, told=hear)
     parameters = parameters_of(learnt.net)
     about = _about(sets, scores_of(learnt.matrix, names), parameters)
     exported = export_onnx(learnt.net, names, lesson.size, working / "model.onnx", about=about)
-    judged = evaluate_model(working / "model.onnx", sets[0].folder, "val", sheet=working / "masks.png")
+    judged = evaluate_on(sets, working / "model.onnx", "val", sheet=working / "masks.png")
     (working / "curves.csv").write_text(csv_of(learnt.epochs), encoding="utf-8")
     pictures = f"{len(train)} pictures, {len(val)} of other scenes for validation"
     draw_curves(learnt.epochs, working / "curves.png", title=f"{parameters / 1e6:.2f} M parameters on {pictures}")
@@ -106,12 +110,12 @@ def train_model(
         "schema": 1,
         "command": "model train",
         **fingerprint,
+        "threads": lesson.threads,
         "added_to_scores": balanced,
         "export": asdict(exported),
     }
     write_json(working / "run.json", record)
-    checkpoint.unlink()
-    (working / "request.json").unlink()
+    close_unfinished(working)
     put_in_place(working, out)
     resumed = lesson.epochs - len(fresh)
     return Trained(out / "model.onnx", learnt.epochs, judged, exported.size_bytes, parameters, resumed)
@@ -121,7 +125,8 @@ def check_request(request: TrainRequest, out: Path, *, overwrite: bool) -> tuple
     """The training sets; refuses what cannot be done before anything is.
 
     Raises:
-        OutputError: `out` cannot be used. ModelError: PyTorch or onnx is not installed, or settings that are none.
+        OutputError: `out` cannot be used, or an interrupted training of other settings is there.
+        ModelError: PyTorch or onnx is not installed, or settings that are none.
         DatasetError: a set cannot be read, has no pictures for validation, or its classes are not those of the first.
     """
     check_out(out, overwrite=overwrite)
@@ -130,8 +135,13 @@ def check_request(request: TrainRequest, out: Path, *, overwrite: bool) -> tuple
             width, height = request.size
             hint = f"--size 256x192; sides are multiples of {_MULTIPLE} from 64 to 1280"
             raise ModelError(f"a network for pictures of {width} x {height}", hint=hint)
+    if request.rate is not None and not 0 < request.rate <= 1:
+        raise ModelError(f"a learning rate of {request.rate:g}", hint="--rate 0.003; above 0, at most 1")
     sets = read_training_sets(request.datasets)
     check_libraries()
+    working = unfinished_folder(out)
+    if has_epochs(working):
+        check_unfinished(working, _fingerprint(sets, lesson_of(request)), overwrite=overwrite)
     return sets
 
 
@@ -145,7 +155,8 @@ def check_libraries() -> None:
 
     missing = [name for name in ("torch", "onnx") if find_spec(name) is None]
     if missing:
-        hint = "pip install 'wallkit[train]'   (no GPU? pip install torch==2.13.0+cpu first: a tenth of the size)"
+        cpu = "pip install torch --index-url https://download.pytorch.org/whl/cpu"
+        hint = f"pip install 'wallkit[train]'   (no GPU? first {cpu}: a tenth of the size)"
         raise ModelError(f"training needs {' and '.join(missing)}, not installed here", hint=hint)
 
 
@@ -153,24 +164,16 @@ def lesson_of(request: TrainRequest) -> Lesson:
     """The request as settings of the training."""
     from wallkit.train.learn import Lesson
 
-    usual = Lesson()
-    return replace(
-        usual,
-        size=request.size,
-        epochs=request.epochs or usual.epochs,
-        batch=request.batch or usual.batch,
-        rate=request.rate or usual.rate,
-        threads=request.threads,
-        seed=request.seed,
-    )
+    asked = {"epochs": request.epochs, "batch": request.batch, "rate": request.rate}
+    given: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
+    return replace(Lesson(), size=request.size, threads=request.threads, seed=request.seed, **given)
 
 
 # -------------------------------------------------------------------------------------------- details
 
 
 def _pictures(sets: tuple[TrainingSet, ...], split: str, size: tuple[int, int]) -> Pictures:
-    pairs = (read_pair(pair, len(one.names)) for one in sets for pair in one.of(split))
-    return stacked(pairs, size)
+    return stacked((read_pair(pair, len(sets[0].names)) for pair in pairs_of(sets, split)), size)
 
 
 def _about(sets: tuple[TrainingSet, ...], scores: tuple[ClassScore, ...], parameters: int) -> dict[str, str]:
@@ -188,7 +191,7 @@ def _about(sets: tuple[TrainingSet, ...], scores: tuple[ClassScore, ...], parame
 
 
 def _fingerprint(sets: tuple[TrainingSet, ...], lesson: Lesson) -> dict[str, Any]:
-    """Everything that decides what is learnt, but for the machine."""
+    """Everything that decides what is learnt, but for the machine and its threads."""
     import torch
 
     plain = {
@@ -196,13 +199,6 @@ def _fingerprint(sets: tuple[TrainingSet, ...], lesson: Lesson) -> dict[str, Any
         "torch": torch.__version__,
         "datasets": [{"folder": one.folder.name, "manifest_sha256": one.sha256} for one in sets],
         "names": list(sets[0].names),
-        "lesson": asdict(lesson),
+        "lesson": {key: value for key, value in asdict(lesson).items() if key != "threads"},
     }
     return dict(json.loads(json.dumps(plain)))
-
-
-def _is_of(working: Path, fingerprint: dict[str, Any]) -> bool:
-    try:
-        return bool(json.loads((working / "request.json").read_text("utf-8")) == fingerprint)
-    except (OSError, ValueError):
-        return False

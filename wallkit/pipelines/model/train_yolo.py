@@ -7,12 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from wallkit.dataset.read import TrainingSet, read_training_sets
-from wallkit.errors import ModelError
+from wallkit.dataset.read import TrainingSet, folders_of, read_training_sets
 from wallkit.pipelines.outputs import check_out, result_folder
 from wallkit.pipelines.run_folder import sha256, write_json
+from wallkit.segment.child import Interpreter, find_interpreter
 from wallkit.train.curves import Epoch, csv_of, draw_curves
-from wallkit.train.yolo import SETUP, YoloLesson, epochs_of, train_yolo
+from wallkit.train.yolo import YoloLesson, epochs_of, train_yolo
 
 # what YOLO's grids need of a picture's sides
 _MULTIPLE = 32
@@ -20,16 +20,22 @@ _MULTIPLE = 32
 
 @dataclass(frozen=True)
 class YoloRequest:
-    """What to train on, with which interpreter and from which start; None takes the default of `YoloLesson`."""
+    """What to train on, and from which start; None takes the default of `YoloLesson`.
+
+    Attributes:
+        python: the interpreter with Ultralytics; None for the one that `find_interpreter` knows.
+        is_trusting: whether the checkpoint may run anything.
+    """
 
     datasets: tuple[Path, ...]
-    python: str
+    python: Path | None
     start: str
     size: tuple[int, int] = (320, 256)
     epochs: int | None = None
     batch: int | None = None
     threads: int = 1
     seed: int = 0
+    is_trusting: bool = False
 
     @property
     def lesson(self) -> YoloLesson:
@@ -37,7 +43,7 @@ class YoloRequest:
         width, height = (-(-side // _MULTIPLE) * _MULTIPLE for side in self.size)
         usual = YoloLesson()
         epochs, batch = self.epochs or usual.epochs, self.batch or usual.batch
-        return YoloLesson(self.start, epochs, batch, (width, height), self.threads, self.seed)
+        return YoloLesson(self.start, epochs, batch, (width, height), self.threads, self.seed, self.is_trusting)
 
 
 @dataclass(frozen=True)
@@ -56,10 +62,11 @@ def train_yolo_model(
     Raises:
         OutputError, DatasetError: see check_yolo. ModelError: the child cannot train.
     """
-    sets = check_yolo(request, out, overwrite=overwrite)
+    interpreter, sets = check_yolo(request, out, overwrite=overwrite)
     names = " and ".join(one.folder.name for one in sets)
     with result_folder(out, overwrite=overwrite) as folder:
-        checkpoint, onnx = train_yolo(request.python, _data(sets, folder), folder, request.lesson, told=told)
+        python = str(interpreter.python)
+        checkpoint, onnx = train_yolo(python, _data(sets, folder), folder, request.lesson, told=told)
         results = (folder / "train" / "results.csv").read_text("utf-8")
         shutil.copy(onnx, folder / "model.onnx")
         shutil.copy(checkpoint, folder / "model.pt")
@@ -81,25 +88,23 @@ def train_yolo_model(
     return YoloTrained(out / "model.onnx", epochs)
 
 
-def check_yolo(request: YoloRequest, out: Path, *, overwrite: bool) -> tuple[TrainingSet, ...]:
-    """The training sets; refuses what cannot be done before anything is.
+def check_yolo(request: YoloRequest, out: Path, *, overwrite: bool) -> tuple[Interpreter, tuple[TrainingSet, ...]]:
+    """Who trains on which sets; refuses what cannot be done before anything is.
 
     Raises:
         OutputError: `out` cannot be used. DatasetError: a set cannot be read, or has other classes.
         ModelError: no interpreter.
     """
     check_out(out, overwrite=overwrite)
-    if not request.python or shutil.which(request.python) is None:
-        said = f"'{request.python}' is no interpreter" if request.python else "which interpreter has Ultralytics?"
-        raise ModelError(said, where="--python", hint="set one up, then pass --python yv/bin/python:\n" + SETUP)
-    return read_training_sets(request.datasets)
+    interpreter = find_interpreter(request.python, is_trusting=request.is_trusting)
+    return interpreter, read_training_sets(request.datasets)
 
 
 def _data(sets: tuple[TrainingSet, ...], folder: Path) -> Path:
     """A data.yaml with whole paths: Ultralytics takes relative ones from a folder of its own."""
     lines = ["names:", *(f"  {number}: {name}" for number, name in enumerate(sets[0].names))]
     for split in ("train", "val"):
-        lines += [f"{split}:", *(f"  - {one.folder.absolute() / 'images' / split}" for one in sets)]
+        lines += [f"{split}:", *(f"  - {place}" for place in folders_of(sets, split))]
     path = folder / "data.yaml"
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
