@@ -106,17 +106,19 @@ def compare(
         numbers = {c.name: {k: v.value for k, v in c.metrics.items()} for c in data.contenders}
         spreads = {c.name: {k: asdict(v) for k, v in c.spreads.items()} for c in data.contenders}
         differences = [{"a": a, "b": b, **asdict(d)} for a, b, d in data.differences]
-        common.emit({"runs": numbers, "spreads": spreads, "differences": differences})
+        common.emit({"runs": numbers, "spreads": spreads, "differences": differences, "notes": data.notes})
     elif paper:
         headers = paper_headers()
         click.echo(common.table(headers, paper_rows(data), right=tuple(range(1, len(headers)))))
-        for line in paper_differences(data):
+        for line in (*paper_differences(data), *(f"note: {note}" for note in data.notes)):
             click.echo(line)
     else:
         rows = [[row.key, *(f"{c.text}{' *' if c.is_best else ''}" for c in row.cells)] for row in compare_rows(data)]
         click.echo(common.table(["metric (* best)", *names], rows, right=tuple(range(1, len(names) + 1))))
         for key, what, how_sure in difference_rows(data):
             click.echo(f"{key}: {what} [{how_sure}]")
+        for note in data.notes:
+            click.echo(f"note: {note}")
         click.echo(data.verdict)
     if out is not None:
         write_compare_report(out, data)

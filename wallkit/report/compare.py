@@ -56,12 +56,14 @@ class CompareData:
     Attributes:
         verdict: the answer in one sentence.
         differences: (name of a, name of b, comparison) for each pair that was tested.
+        notes: what was left out of the tests, a sentence each.
     """
 
     title: str
     verdict: str
     contenders: tuple[Contender, ...]
     differences: tuple[tuple[str, str, Comparison], ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
