@@ -188,11 +188,11 @@ def load_seeds(folder: Path, settings: EvaluateSettings, truth: Path | None) -> 
 
     from wallkit.evaluate.tum import read_tum
     from wallkit.pipelines.evaluate import evaluate_steps
-    from wallkit.pipelines.run_folder import read_run
+    from wallkit.pipelines.run_folder import read_run, seed_folders
 
     if not (folder / "run.json").is_file() and (inside := sorted(path.parent for path in folder.glob("*/run.json"))):
         return [pair for one in inside for pair in load_seeds(one, settings, truth)]
-    folders = sorted(folder.glob("seed-*"), key=lambda path: int(path.name.removeprefix("seed-"))) or [folder]
+    folders = seed_folders(folder) or [folder]
     known = None if truth is None else read_tum(truth)
     found = []
     for one in folders:

@@ -10,7 +10,7 @@ from wallkit.core.results import Value
 from wallkit.pipelines.batch.gather import Row, gather
 from wallkit.pipelines.batch.labels import labels_of_runs
 from wallkit.pipelines.batch.runs import DONE, FAILED, Runs
-from wallkit.pipelines.run_folder import read_json
+from wallkit.pipelines.run_folder import read_json, seed_folders
 from wallkit.report.data import flatten
 
 
@@ -40,7 +40,7 @@ def read_folders(folders: Sequence[Path], names: Sequence[str]) -> Runs:
 def _rows(folder: Path, name: str, labels: dict[str, Value]) -> Iterator[Row]:
     for log in sorted(path for path in folder.iterdir() if path.is_dir()):
         # one that was stopped has seeds without numbers, or nothing at all
-        for run in sorted(log.glob("seed-*"), key=_number) or [log]:
+        for run in seed_folders(log) or [log]:
             if (run / "metrics.json").is_file():
                 answer, config = read_json(run / "metrics.json"), read_json(run / "run.json")["config"]
                 metrics = {key: answer[key] for key in labels if key in answer}
