@@ -38,6 +38,14 @@ def test_a_run_json_that_is_no_object_is_told(tmp_path):
     assert "run.json: is list in JSON, where an object is wanted" in refused("evaluate", tmp_path)
 
 
+@pytest.mark.parametrize(
+    "words", [("--t-offset", "nan"), ("--t-offset", "1e300"), ("--set", "evaluate.truth_offset_s=nan")]
+)
+def test_an_offset_that_is_no_time_is_told(tmp_path, words):
+    said = refused("evaluate", write_folder(tmp_path / "a", 0.05), *words)
+    assert "'evaluate.truth_offset_s' is" in said
+
+
 def test_a_folder_called_like_a_seed_is_told(tmp_path):
     for name in ("seed-0", "seed-old"):
         write_folder(tmp_path / "a" / name, 0.05)
