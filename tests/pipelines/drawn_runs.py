@@ -26,11 +26,16 @@ def record(error_m, *, seed=0, log=LOG, digest="a" * 64, truth=True):
         "origins": {}, "config_file": None, "start": "global", "scan": "/scan", "odometry": "/odom", "lidar_mount": "given",
         "ceiling": None,
     }  # fmt: skip
-    answer = {"health": "LOCALIZED", "reason": "", "modes": [{}], "seed": seed}
-    poses = round_trip().poses + offset
-    return RunRecord(
-        Path(log).name, replace(drawn, poses=poses), answer, run, None, round_trip() if truth else None, None, ()
-    )
+    moved, known = replace(drawn, poses=round_trip().poses + offset), round_trip() if truth else None
+    numbers = evaluate_steps(moved, known, EvaluateSettings()).metrics
+    answer = {
+        "health": "LOCALIZED",
+        "reason": "",
+        "modes": [{}],
+        "seed": seed,
+        **{k: v.value for k, v in numbers.items()},
+    }
+    return RunRecord(Path(log).name, moved, answer, run, None, known, None, ())
 
 
 def judged(error_m, **options):

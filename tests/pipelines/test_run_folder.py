@@ -51,3 +51,15 @@ def test_a_folder_called_like_a_seed_is_told(tmp_path):
         write_folder(tmp_path / "a" / name, 0.05)
     (tmp_path / "a" / "run.json").write_text("{}")
     assert f"{tmp_path / 'a'}: 'seed-old' is not the folder of a seed" in refused("evaluate", tmp_path / "a")
+
+
+def test_what_other_commands_left_beside_results_is_passed_over(tmp_path):
+    for name in ("hall", "lab"):
+        write_folder(tmp_path / "basic" / name, 0.05)
+        write_folder(tmp_path / "soft" / name, 0.06)
+    (tmp_path / "basic" / "sim").mkdir()
+    (tmp_path / "basic" / "sim" / "run.json").write_text('{"command": "simulate log"}')
+    done = CliRunner().invoke(main, ["evaluate", str(tmp_path / "basic")])
+    assert (done.exit_code, "over 2 runs" in done.output) == (0, True)
+    done = CliRunner().invoke(main, ["compare", str(tmp_path / "basic"), str(tmp_path / "soft")])
+    assert (done.exit_code, "stopped before it ended" in done.output) == (0, False), done.output

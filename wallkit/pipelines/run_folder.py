@@ -118,7 +118,7 @@ def read_run(folder: Path) -> RunRecord:
     # every command of wallkit leaves a run.json
     if "logs" not in run or "config" not in run:
         made_by = f": run.json is of wallkit {run['command']}" if "command" in run else ""
-        inside = sorted(path.parent.name for path in folder.glob("*/run.json"))
+        inside = [path.name for path in results_in(folder)]
         hint = f"name one of {', '.join(inside)} in it" if inside else "name an --out of wallkit localize"
         raise WallkitError(f"no result of wallkit localize{made_by}", where=folder, hint=hint)
     truth, odometry = folder / "truth.tum", folder / "odometry.tum"
@@ -133,6 +133,11 @@ def read_run(folder: Path) -> RunRecord:
         _read_snapshots(folder / "snapshots.npz"),
         read_overlays(folder),
     )
+
+
+def results_in(folder: Path) -> list[Path]:
+    """The result folders of wallkit localize in a folder, by name; what other commands left beside them is passed over."""
+    return sorted(path.parent for path in folder.glob("*/run.json") if "command" not in read_json(path))
 
 
 def seed_folders(folder: Path) -> list[Path]:
