@@ -18,7 +18,7 @@ from wallkit.core.results import Value
 from wallkit.maps.findings.judged import Judged
 from wallkit.pipelines.calib.verify import VerifyRequest, verify_calibration
 from wallkit.pipelines.cameras import ORACLE_MODEL, CameraRequest
-from wallkit.pipelines.config import load_config
+from wallkit.pipelines.config import default_config
 from wallkit.pipelines.evaluate import Evaluation
 from wallkit.pipelines.localize import Request, prepare
 from wallkit.pipelines.map.verdicts import Selection, judge
@@ -91,7 +91,7 @@ class Demo:
 def run_demo(out: Path, observe: Callable[[str], None] = lambda doing: None) -> Demo:
     """Judge the sample's map and calibration, localize it with every method, and write each run and the comparison."""
     observe("validating the map")
-    config = load_config(None).config
+    config = default_config().config
     (judged,) = judge([MAP], Selection(config.rules, datetime.date.today()))
     observe("verifying the calibration")
     verified = verify_calibration(VerifyRequest((LOG,), CALIBRATION))
@@ -152,7 +152,7 @@ def folder_of(method: str) -> str:
 
 def _localized(method: Method, folder: Path, shared: Shared) -> Seeds:
     """Every seed; the first with its report and pictures."""
-    loaded = load_config(None, method.words)
+    loaded = default_config(method.words)
     cameras = CameraRequest((CALIBRATION,), model=method.model) if method.model else CameraRequest()
     request = Request((LOG,), MAP, init="global", cameras=cameras)
     prepared = prepare(request, loaded.config, seeds=SEEDS, shared=shared)
