@@ -18,11 +18,12 @@ def refused(*words):
     return done.output
 
 
+@pytest.mark.parametrize("made_by", ["simulate log", "wallkit simulate log"])
 @pytest.mark.parametrize("command", ["evaluate", "report", "compare"])
-def test_folders_of_other_commands_are_no_runs(tmp_path, command):
+def test_folders_of_other_commands_are_no_runs(tmp_path, command, made_by):
     sim = tmp_path / "sim"
     sim.mkdir()
-    (sim / "run.json").write_text(json.dumps({"schema": 1, "command": "simulate log", "seed": 0}))
+    (sim / "run.json").write_text(json.dumps({"schema": 1, "command": made_by, "seed": 0}))
     words = [command, sim, sim] if command == "compare" else [command, sim]
     assert f"{sim}: no result of wallkit localize: run.json is of wallkit simulate log\n  hint: " in refused(*words)
 

@@ -117,7 +117,8 @@ def read_run(folder: Path) -> RunRecord:
     run = read_json(folder / "run.json")
     # every command of wallkit leaves a run.json
     if "logs" not in run or "config" not in run:
-        made_by = f": run.json is of wallkit {run['command']}" if "command" in run else ""
+        command = str(run.get("command", "")).removeprefix("wallkit ")
+        made_by = f": run.json is of wallkit {command}" if command else ""
         inside = [path.name for path in results_in(folder)]
         hint = f"name one of {', '.join(inside)} in it" if inside else "name an --out of wallkit localize"
         raise WallkitError(f"no result of wallkit localize{made_by}", where=folder, hint=hint)
