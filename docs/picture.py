@@ -2,7 +2,7 @@
 
 The README's picture is made by
 
-    wallkit demo && python docs/picture.py wallkit-demo/class_conditional docs/pictures/demo.png
+    wallkit demo && python docs/picture.py wallkit-demo/class_conditional/seed-0 docs/pictures/demo.png
 """
 
 from __future__ import annotations

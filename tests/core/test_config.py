@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -50,6 +51,8 @@ class Outer:
     mode: Literal["fast", "slow"] = setting("fast", "mode")
     is_on: bool = setting(True, "switch")
     limit: float | None = setting(None, "limit")
+    corners: tuple[tuple[float, float], ...] = setting((), "nested")
+    far_m: float = setting(1.0, "a range that allows infinity", high=math.inf)
     way: str = choice(WAYS, "left", "which way")
     shape: Round | Square = component(SHAPES, "round", "the shape")
     inner: Inner = section(Inner, "inside")
@@ -93,6 +96,10 @@ def test_another_component_drops_the_settings_of_the_one_before():
         ("speed=fast", "must be a number"),
         ("speed=-1", "at least 0"),
         ("speed=nan", "at least 0"),
+        ("speed=inf", "must be a finite number"),
+        ("limit=nan", "must be a finite number"),
+        ("limit=-inf", "must be a finite number"),
+        ("corners=[[1.0, nan]]", "must be a finite number"),
         ("inner.count=10", "at most 9"),
         ("inner.count=1.5", "a whole number"),
         ("inner.count=true", "a whole number"),
@@ -115,6 +122,12 @@ def test_a_mistake_in_a_file_names_the_line_and_the_closest_name(tmp_path):
         build(Outer, [source("speed = 1\n\n[inner]\n# how many\ncuont = 4\n", tmp_path)])
     assert "wallkit.toml:5" in str(caught.value)
     assert "count" in str(caught.value.hint)
+
+
+def test_infinity_passes_where_the_range_names_it():
+    assert build(Outer, [source_from_words(["far_m=inf"])])[0].far_m == math.inf
+    with pytest.raises(ConfigError, match="finite"):
+        build(Outer, [source_from_words(["far_m=-inf"])])
 
 
 @pytest.mark.parametrize("text", ["speed = ", "speed = fast", "[inner"])

@@ -203,3 +203,6 @@ def test_folders_of_result_folders_are_read_as_a_batch(folders):
         assert CliRunner().invoke(main, bad).exit_code == 2
     bad = CliRunner().invoke(main, ["compare", "basic", "soft/hall-0-1", "--by", "people"])
     assert (bad.exit_code, "--by is for" in bad.output) == (2, True)
+    for bad_words in (["-c", "wallkit.toml"], ["--set", "evaluate.lost_m=2"]):
+        done = CliRunner().invoke(main, ["compare", "basic", "soft", *bad_words])
+        assert (done.exit_code, "--config and --set do not change" in done.output) == (2, True)

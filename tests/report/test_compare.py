@@ -68,6 +68,12 @@ def test_differences_in_words(difference, better, p_value, words):
     assert sure.startswith(words[1])
 
 
+def test_too_few_pairs_have_no_interval_in_words():
+    found = Comparison("x", "m", 0.25, None, None, 0.25, 3, "Wilcoxon", "neither")
+    ((_, what, _),) = difference_rows(CompareData("t", "v", (), (("old", "new", found),)))
+    assert what == "no difference can be told: new has 0.250 m more than old (no 95 % interval of fewer than 6 pairs)"
+
+
 def test_figures_need_a_truth_and_take_any_number_of_runs():
     assert compare_figures(CompareData("t", "v", (contender("a", {}), contender("b", {}, data=run(errors=None))))) == ()
     many = tuple(contender(f"a very long folder name, longer/run {n}", {}, data=run()) for n in range(7))

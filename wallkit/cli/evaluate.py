@@ -26,6 +26,7 @@ truth_option = click.option(
 @click.option("--max-ate-m", type=float, metavar="M", help="Exit 1 if the rmse of any run is above.")
 @click.option("--evo", is_flag=True, help="Also write result zips for evo_res into --out.")
 @common.out_option
+@common.overwrite_option
 @common.config_option
 @common.set_option
 @common.json_option
@@ -42,7 +43,9 @@ def evaluate(ctx: click.Context, /, runs: tuple[Path, ...], as_json: bool, **fla
       wallkit evaluate log.wallkit
       wallkit evaluate log.wallkit --truth mocap.tum --max-ate-m 0.1
       wallkit evaluate log.wallkit --json | jq .metrics.ate_rmse_m
+      wallkit evaluate a/ b/ --evo --out zips
     """
+    _check_evo(flags["out"], is_evo=flags["evo"], overwrite=flags["overwrite"])
     settings = _settings(flags["config_path"], flags["words"], flags["t_offset"])
     found = [pair for run in runs for pair in load_seeds(run, settings, flags["truth"])]
     if as_json:
@@ -50,7 +53,7 @@ def evaluate(ctx: click.Context, /, runs: tuple[Path, ...], as_json: bool, **fla
     else:
         click.echo(_table(found))
     if flags["evo"]:
-        _write_evo(flags["out"], found)
+        _write_evo(flags["out"], runs, found, overwrite=flags["overwrite"])
     limit = flags["max_ate_m"]
     if limit is not None:
         worst = max(_ate_of(record, evaluation) for record, evaluation in found)
@@ -106,17 +109,19 @@ def compare(
         numbers = {c.name: {k: v.value for k, v in c.metrics.items()} for c in data.contenders}
         spreads = {c.name: {k: asdict(v) for k, v in c.spreads.items()} for c in data.contenders}
         differences = [{"a": a, "b": b, **asdict(d)} for a, b, d in data.differences]
-        common.emit({"runs": numbers, "spreads": spreads, "differences": differences})
+        common.emit({"runs": numbers, "spreads": spreads, "differences": differences, "notes": data.notes})
     elif paper:
         headers = paper_headers()
         click.echo(common.table(headers, paper_rows(data), right=tuple(range(1, len(headers)))))
-        for line in paper_differences(data):
+        for line in (*paper_differences(data), *(f"note: {note}" for note in data.notes)):
             click.echo(line)
     else:
         rows = [[row.key, *(f"{c.text}{' *' if c.is_best else ''}" for c in row.cells)] for row in compare_rows(data)]
         click.echo(common.table(["metric (* best)", *names], rows, right=tuple(range(1, len(names) + 1))))
         for key, what, how_sure in difference_rows(data):
             click.echo(f"{key}: {what} [{how_sure}]")
+        for note in data.notes:
+            click.echo(f"note: {note}")
         click.echo(data.verdict)
     if out is not None:
         write_compare_report(out, data)
@@ -188,16 +193,22 @@ def load_seeds(folder: Path, settings: EvaluateSettings, truth: Path | None) -> 
     from wallkit.pipelines.evaluate import evaluate_steps
     from wallkit.pipelines.run_folder import read_run
 
-    if not (folder / "run.json").is_file() and (inside := sorted(path.parent for path in folder.glob("*/run.json"))):
-        return [pair for one in inside for pair in load_seeds(one, settings, truth)]
-    folders = sorted(folder.glob("seed-*"), key=lambda path: int(path.name.removeprefix("seed-"))) or [folder]
     known = None if truth is None else read_tum(truth)
     found = []
-    for one in folders:
+    for one in _folders_in(folder):
         record = read_run(one)
         record = record if known is None else replace(record, truth=known)
         found.append((record, evaluate_steps(record.steps, record.truth, settings)))
     return found
+
+
+def _folders_in(folder: Path) -> list[Path]:
+    """The folders of the single runs that `load_seeds` reads, in the same order."""
+    from wallkit.pipelines.run_folder import results_in, seed_folders
+
+    if not (folder / "run.json").is_file() and (inside := results_in(folder)):
+        return [one for result in inside for one in _folders_in(result)]
+    return seed_folders(folder) or [folder]
 
 
 def _settings(config_path: Path | None, words: tuple[str, ...], offset_s: float | None) -> EvaluateSettings:
@@ -242,24 +253,53 @@ def _ate_of(record: RunRecord, evaluation: Evaluation) -> float:
     return value.value
 
 
-def _write_evo(out: Path | None, found: list[tuple[RunRecord, Evaluation]]) -> None:
+def _check_evo(out: Path | None, *, is_evo: bool, overwrite: bool) -> None:
+    """Refuse, before anything is read, zips without a place and a place without zips."""
+    from wallkit.pipelines.outputs import check_out
+
+    if not is_evo and (out is not None or overwrite):
+        raise click.UsageError("--out and --overwrite are for the zips of --evo")
+    if is_evo and out is None:
+        raise click.UsageError("say where the zips go: --out FOLDER")
+    if out is not None:
+        check_out(out, overwrite=overwrite)
+
+
+def _write_evo(
+    out: Path, runs: tuple[Path, ...], found: list[tuple[RunRecord, Evaluation]], *, overwrite: bool
+) -> None:
+    """A zip for each run and kind of error, and a run.json, by which --overwrite knows the folder again."""
     from wallkit.errors import WallkitError
     from wallkit.evaluate.evo import write_evo_zip
     from wallkit.evaluate.metrics import SERIES
+    from wallkit.pipelines.outputs import result_folder
+    from wallkit.pipelines.run_folder import write_json
 
-    if out is None:
-        raise click.UsageError("say where the zips go: --out FOLDER")
-    out.mkdir(parents=True, exist_ok=True)
-    for record, evaluation in found:
-        if evaluation.pairs is None:
-            raise WallkitError(
-                "has no truth, so there is no error to export", where=record.name, hint="--truth FILE.tum"
-            )
-        for name in SERIES:
-            if SERIES[name](evaluation.pairs) is not None:
-                seed = f"-seed-{record.run['seed']}" if len(found) > 1 else ""
-                write_evo_zip(out / f"{name}{seed}.zip", evaluation.pairs, name)
+    names = _zip_names(runs)
+    with result_folder(out, overwrite=overwrite) as folder:
+        for of_run, (record, evaluation) in zip(names, found, strict=True):
+            if evaluation.pairs is None:
+                raise WallkitError(
+                    "has no truth, so there is no error to export", where=record.name, hint="--truth FILE.tum"
+                )
+            for series in SERIES:
+                if SERIES[series](evaluation.pairs) is not None:
+                    write_evo_zip(folder / f"{series}{of_run}.zip", evaluation.pairs, series)
+        write_json(folder / "run.json", {"schema": 1, "command": "evaluate --evo", "runs": [str(run) for run in runs]})
     click.echo(f"evo      {out}", err=True)
+
+
+def _zip_names(runs: tuple[Path, ...]) -> list[str]:
+    """What tells the zips of each run apart: its folders, as named and as found inside; nothing for a single run."""
+    # the root of an absolute path is a part of its own
+    found = [
+        "-".join(("", *Path(name).parts, *one.relative_to(run).parts)).replace("/", "")
+        for name, run in zip(_names(runs), runs, strict=True)
+        for one in _folders_in(run)
+    ]
+    if twice := [name for name in found if found.count(name) > 1]:
+        raise click.UsageError(f"two runs would write the same zips, *{twice[0]}.zip: export them one by one")
+    return found if len(found) > 1 else [""]
 
 
 def _names(runs: tuple[Path, ...]) -> list[str]:

@@ -58,6 +58,9 @@ def compare(
     as_json: bool,
 ) -> None:
     """Say it, or emit it; with `out` a page without maps as well."""
+    if flags["config_path"] is not None or flags["words"]:
+        message = "many logs are compared by the numbers that their runs wrote, which --config and --set do not change"
+        raise click.UsageError(f"{message}: compare two runs of one log, or localize again")
     found = read(runs, names, flags)
     data = judged(found, names, flags, is_paper=is_paper)
     if as_json:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import importlib
+import math
 import re
 import tomllib
 import types
@@ -26,8 +27,9 @@ Registry = Mapping[str, Any]
 # ------------------------------------------------------------------------------------- declaring settings
 
 
+# the unit of a setting is the suffix of its name
 def setting(default: Any, doc: str, *, low: float | None = None, high: float | None = None) -> Any:
-    """A field with a default, one line of documentation and an inclusive range; the unit is the name's suffix."""
+    """A field with a default, one line of documentation and an inclusive range, infinite only if an end is."""
     return field(default=default, metadata={"doc": doc, "low": low, "high": high})
 
 
@@ -303,14 +305,20 @@ def _checked(value: Any, hint: Any, f: dataclasses.Field[Any], source: Source, h
         except ConfigError as error:
             raise ConfigError(error.message, where=source.place(here), hint=error.hint) from error
     low, high = f.metadata.get("low"), f.metadata.get("high")
-    for number in value if isinstance(value, tuple) else (value,):
+    for number in _flat(value):
         if isinstance(number, (int, float)) and not isinstance(number, bool):
             # written so that NaN fails
             if low is not None and not number >= low:
                 raise ConfigError(f"'{key}' is {value!r}, but must be at least {low}", where=source.place(here))
             if high is not None and not number <= high:
                 raise ConfigError(f"'{key}' is {value!r}, but must be at most {high}", where=source.place(here))
+            if not math.isfinite(number) and number not in (low, high):
+                raise ConfigError(f"'{key}' is {value!r}, but must be a finite number", where=source.place(here))
     return value
+
+
+def _flat(value: Any) -> list[Any]:
+    return [inner for v in value for inner in _flat(v)] if isinstance(value, tuple) else [value]
 
 
 def _converted(value: Any, hint: Any) -> Any:

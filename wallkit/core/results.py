@@ -7,6 +7,9 @@ from typing import Literal
 
 from wallkit.core.types import Float64Array, Int64Array
 
+# of fewer pairs neither a signed-rank test reaches p = 0.05, nor does a bootstrapped interval hold as often as it says
+FEWEST_PAIRS = 6
+
 
 @dataclass(frozen=True, slots=True)
 class Limits:
@@ -99,7 +102,7 @@ class Comparison:
     """How much b differs from a.
 
     Attributes:
-        difference: mean of b - a. low, high: its 95 % interval.
+        difference: mean of b - a. low, high: its 95 % interval; None of fewer than FEWEST_PAIRS.
         p_value: chance of a difference this large if there were none; two-sided.
         pairs: how many pairs it rests on. method: the test, in words.
     """
@@ -107,8 +110,8 @@ class Comparison:
     key: str
     unit: str
     difference: float
-    low: float
-    high: float
+    low: float | None
+    high: float | None
     p_value: float
     pairs: int
     method: str

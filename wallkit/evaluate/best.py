@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wallkit.core.types import BoolArray, Float64Array, Int64Array
-from wallkit.evaluate.over_logs import small_sample_z
-from wallkit.evaluate.statistics import SIGNIFICANT_P
+from wallkit.evaluate.statistics import SIGNIFICANT_P, small_sample_z
 
 # with five, no signed-rank test reaches p = 0.05 either
 FEWEST_LOGS = 6

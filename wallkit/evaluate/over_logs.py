@@ -15,13 +15,11 @@ import numpy as np
 
 from wallkit.core.results import Distribution, Interval, Paired, Value
 from wallkit.core.types import Float64Array, Int64Array
-from wallkit.evaluate.statistics import SIGNIFICANT_P, signed_rank_p
+from wallkit.evaluate.statistics import RESAMPLES_OF_PAIRS, better_of, percentiles, signed_rank_p
 
 # numbers drawn for one interval, and the resamples that are made of them at least and at most
 _DRAWN = 3_000_000
 _LEAST, RESAMPLES = 500, 2000
-# of a comparison, whose verdict may hang on the end of its interval
-_RESAMPLES_OF_PAIRS = 10_000
 # numbers in one block of resamples x runs
 _BLOCK = 1_000_000
 _TAIL = 0.95
@@ -47,7 +45,7 @@ def distribution(
     at = _statistics(numbers, weights[None, :])[:, 0]
     drawn = _resampled(rng, numbers, weights, of_log, resamples) if len(runs) > 1 else None
     mean, median, tail = (
-        Interval(float(at[i]), *(_percentiles(drawn[i], len(runs)) if drawn is not None else (None, None)))
+        Interval(float(at[i]), *(percentiles(drawn[i], len(runs)) if drawn is not None else (None, None)))
         for i in range(3)
     )
     return Distribution(
@@ -64,7 +62,7 @@ def compare_pairs(
     b: tuple[Int64Array, Float64Array],
     log_of: Int64Array,
     *,
-    resamples: int = _RESAMPLES_OF_PAIRS,
+    resamples: int = RESAMPLES_OF_PAIRS,
 ) -> Paired | None:
     """How b differs from a, by the runs both have; None if there is no such run.
 
@@ -92,7 +90,7 @@ def compare_pairs(
         label.key, label.unit, float(unit_a.mean()), float(unit_b.mean()), difference, percent, middle, p_value, p_value,
         len(unit_a), over, len(common), len(pairs_a) - len(common), len(pairs_b) - len(common),
         int(np.sum(gain < 0)), int(np.sum(gain > 0)), int(np.sum((unit_b - unit_a) * difference.value > 0)),
-        _better(label, difference, p_value),
+        better_of(label, difference, p_value),
     )  # fmt: skip
 
 
@@ -102,7 +100,7 @@ def corrected(found: Sequence[Paired], better: str) -> list[Paired]:
     p_holm = dict(zip(known, holm([float(found[i].p_value or 0.0) for i in known]), strict=True))
     label = Value("", None, "", "", "higher" if better == "higher" else "lower" if better else "")
     return [
-        replace(c, tests=len(known), p_holm=p_holm.get(i), better=_better(label, c.difference, p_holm.get(i)))
+        replace(c, tests=len(known), p_holm=p_holm.get(i), better=better_of(label, c.difference, p_holm.get(i)))
         for i, c in enumerate(found)
     ]
 
@@ -148,26 +146,6 @@ def _resampled(
         drawn = rng.multinomial(count, np.full(count, 1 / count), size=size)
         found.append(_statistics(numbers, drawn[:, of_log] * weights))
     return np.concatenate(found, axis=1)
-
-
-def _percentiles(values: Float64Array, count: int) -> tuple[float, float]:
-    """The 95 % interval of what was drawn from `count` units."""
-    from scipy import stats
-
-    share = 100 * float(stats.norm.cdf(small_sample_z(count)))
-    low, high = np.percentile(values, [share, 100 - share]).tolist()
-    return low, high
-
-
-def small_sample_z(count: int) -> float:
-    """Where to cut a normal spread of resamples for 95 %: -1.96 for many units, further out for few.
-
-    Resamples vary by 1 / n where 1 / (n - 1) is right, and their spread is itself uncertain (Hesterberg 2015, What teachers
-    should know about the bootstrap, section 5).
-    """
-    from scipy import stats
-
-    return float(stats.t.ppf(0.025, count - 1) * np.sqrt(count / (count - 1)))
 
 
 def _sd_within(numbers: Float64Array, of_log: Int64Array, runs: Int64Array) -> float | None:
@@ -217,12 +195,4 @@ def _blocks(resamples: int, numbers: int) -> list[int]:
 
 
 def _interval(value: float, drawn: Float64Array, count: int) -> Interval:
-    return Interval(value, *_percentiles(drawn, count)) if count > 1 else Interval(value)
-
-
-def _better(label: Value, difference: Interval, p_value: float | None) -> Literal["a", "b", "neither"]:
-    """Only where the test and the interval of the mean agree: ranks may favour the one, and a few bad logs the other."""
-    low, high = difference.low, difference.high
-    if p_value is None or p_value >= SIGNIFICANT_P or low is None or high is None or low <= 0 <= high:
-        return "neither"
-    return "neither" if not label.better else "b" if (high < 0) == (label.better == "lower") else "a"
+    return Interval(value, *percentiles(drawn, count)) if count > 1 else Interval(value)

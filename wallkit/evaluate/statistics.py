@@ -8,11 +8,13 @@ from typing import Literal
 
 import numpy as np
 
-from wallkit.core.results import Comparison, Errors, Spread, Value
+from wallkit.core.results import FEWEST_PAIRS, Comparison, Errors, Interval, Spread, Value
 from wallkit.core.types import Float64Array
 from wallkit.errors import WallkitError
 
 SIGNIFICANT_P = 0.05
+# of a comparison, whose verdict may hang on the end of its interval
+RESAMPLES_OF_PAIRS = 10_000
 
 
 def summarise(runs: Sequence[Mapping[str, Value]]) -> dict[str, Spread]:
@@ -22,11 +24,12 @@ def summarise(runs: Sequence[Mapping[str, Value]]) -> dict[str, Spread]:
 
 
 def compare_seeds(
-    rng: np.random.Generator, a: Sequence[Value], b: Sequence[Value], *, resamples: int = 2000
+    rng: np.random.Generator, a: Sequence[Value], b: Sequence[Value], *, resamples: int = RESAMPLES_OF_PAIRS
 ) -> Comparison:
     """One metric of two configurations, run by run with the same seeds.
 
-    Wilcoxon's signed-rank test (1945), exact for small samples; the interval is a percentile bootstrap over the seeds.
+    Wilcoxon's signed-rank test (1945), exact for small samples; the interval is a percentile bootstrap over the seeds, from
+    FEWEST_PAIRS on.
 
     Raises:
         WallkitError: not as many runs on both sides, or fewer than two, or a run without the number.
@@ -37,13 +40,14 @@ def compare_seeds(
         message = f"'{key}' cannot be compared: {len(a)} and {len(b)} runs, {missing} of them without it"
         raise WallkitError(message, hint="run both configurations with the same seeds, two at least: --seeds 10")
     differences = np.array([v.value for v in b], dtype=np.float64) - np.array([v.value for v in a], dtype=np.float64)
-    means = differences[rng.integers(0, len(differences), (resamples, len(differences)))].mean(axis=1)
-    low, high = np.percentile(means, [2.5, 97.5]).tolist()
-    p_value = signed_rank_p(differences)
+    count, mean = len(differences), Interval(float(differences.mean()))
+    if count >= FEWEST_PAIRS:
+        means = differences[rng.integers(0, count, (resamples, count))].mean(axis=1)
+        mean = Interval(mean.value, *percentiles(means, count))
     # n pairs cannot give less than 2 / 2^n: five agreeing seeds are not yet significant
-    least = 2.0 ** (1 - len(differences))
+    least = 2.0 ** (1 - count)
     method = "Wilcoxon signed-rank over seeds" + (f"; p cannot fall below {least:.3g}" if least > SIGNIFICANT_P else "")
-    return _comparison(a[0], (float(differences.mean()), low, high, p_value), len(differences), method)
+    return _comparison(a[0], mean, signed_rank_p(differences), count, method)
 
 
 def compare_errors(rng: np.random.Generator, a: Errors, b: Errors, *, resamples: int = 2000) -> Comparison:
@@ -68,8 +72,8 @@ def compare_errors(rng: np.random.Generator, a: Errors, b: Errors, *, resamples:
     # how often the resampled mean falls on the other side of zero, on the worse of both sides
     side = max(min(float(np.mean(means <= 0)), float(np.mean(means >= 0))), 1 / resamples)
     label = Value("error_mean_m", None, "m", "mean distance between estimate and truth")
-    statistics = (float(differences.mean()), low, high, min(1.0, 2 * side))
-    return _comparison(label, statistics, count, f"block bootstrap over time, {block} updates a block")
+    mean = Interval(float(differences.mean()), low, high)
+    return _comparison(label, mean, min(1.0, 2 * side), count, f"block bootstrap over time, {block} updates a block")
 
 
 def signed_rank_p(differences: Float64Array) -> float:
@@ -82,6 +86,38 @@ def signed_rank_p(differences: Float64Array) -> float:
     if len(differences) <= 13:
         return float(stats.wilcoxon(differences, method=stats.PermutationMethod(n_resamples=9999)).pvalue)
     return float(stats.wilcoxon(differences, method="auto").pvalue)
+
+
+def percentiles(values: Float64Array, count: int) -> tuple[float, float]:
+    """The 95 % interval of what was drawn again and again from `count` units (R,)."""
+    from scipy import stats
+
+    share = 100 * float(stats.norm.cdf(small_sample_z(count)))
+    low, high = np.percentile(values, [share, 100 - share]).tolist()
+    return low, high
+
+
+def small_sample_z(count: int) -> float:
+    """Where to cut a normal spread of resamples for 95 %: -1.96 for many units, further out for few.
+
+    Resamples vary by 1 / n where 1 / (n - 1) is right, and their spread is itself uncertain (Hesterberg 2015, What teachers
+    should know about the bootstrap, section 5).
+    """
+    from scipy import stats
+
+    return float(stats.t.ppf(0.025, count - 1) * np.sqrt(count / (count - 1)))
+
+
+def better_of(label: Value, difference: Interval, p_value: float | None) -> Literal["a", "b", "neither"]:
+    """Only where the test and the interval of the mean agree: ranks may favour the one, and a few bad units the other.
+
+    Args:
+        label: which way is better; its value is not read. difference: of b - a.
+    """
+    low, high = difference.low, difference.high
+    if p_value is None or p_value >= SIGNIFICANT_P or low is None or high is None or low <= 0 <= high:
+        return "neither"
+    return "neither" if not label.better else "b" if (high < 0) == (label.better == "lower") else "a"
 
 
 def _block_means(values: Float64Array, block: int) -> Float64Array:
@@ -99,9 +135,6 @@ def _spread(values: Sequence[Value | None]) -> Spread:
     return Spread(label.key, label.unit, float(np.mean(numbers)) if numbers else None, sd, worst, len(values), missing)
 
 
-def _comparison(label: Value, statistics: tuple[float, float, float, float], pairs: int, method: str) -> Comparison:
-    difference, low, high, p_value = statistics
-    better: Literal["a", "b", "neither"] = "neither"
-    if p_value < SIGNIFICANT_P and label.better:
-        better = "b" if (difference < 0) == (label.better == "lower") else "a"
-    return Comparison(label.key, label.unit, difference, low, high, p_value, pairs, method, better)
+def _comparison(label: Value, mean: Interval, p_value: float, pairs: int, method: str) -> Comparison:
+    better = better_of(label, mean, p_value)
+    return Comparison(label.key, label.unit, mean.value, mean.low, mean.high, p_value, pairs, method, better)

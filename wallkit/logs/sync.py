@@ -36,10 +36,15 @@ class SyncConfig:
     """How sweeps, odometry and images are brought together."""
 
     image_tolerance_s: float = setting(
-        0.06, "an image farther than this from the sweep's middle is not used; half the time between images", low=0
+        0.06,
+        "an image farther than this from the sweep's middle is not used; half the time between images",
+        low=0,
+        high=4e9,
     )
-    odometry_gap_max_s: float = setting(1.0, "longest time without odometry that is interpolated over", low=0)
-    lookahead_s: float = setting(10.0, "how much later than a sweep its odometry and image may be recorded", low=0)
+    odometry_gap_max_s: float = setting(1.0, "longest time without odometry that is interpolated over", low=0, high=4e9)
+    lookahead_s: float = setting(
+        10.0, "how much later than a sweep its odometry and image may be recorded", low=0, high=4e9
+    )
     range_min_m: float = setting(0.0, "nearer returns are not used (the driver's own limit counts too)", low=0)
     range_max_m: float = setting(
         100.0, "farther returns are not used (the driver's own limit counts too)", low=0, high=1e4

@@ -73,6 +73,16 @@ def load_config(path: Path | None, words: Sequence[str] = (), flags: dict[str, A
     return LoadedConfig(config, origins, path)
 
 
+def default_config(words: Sequence[str] = ()) -> LoadedConfig:
+    """The defaults with --set words, whatever a ./wallkit.toml says: for results that are to be the same everywhere.
+
+    Raises:
+        ConfigError: see core.config.
+    """
+    config, origins = build(Config, [source_from_words(words)])
+    return LoadedConfig(config, origins, None)
+
+
 def with_files_beside(source: Source, path: Path) -> Source:
     """The source with its map, model and cache named from here, not from the file's folder."""
     table = _beside(_beside(source.table, "map", path), "ceiling", path)

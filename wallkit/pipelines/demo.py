@@ -18,13 +18,13 @@ from wallkit.core.results import Value
 from wallkit.maps.findings.judged import Judged
 from wallkit.pipelines.calib.verify import VerifyRequest, verify_calibration
 from wallkit.pipelines.cameras import ORACLE_MODEL, CameraRequest
-from wallkit.pipelines.config import load_config
+from wallkit.pipelines.config import default_config
 from wallkit.pipelines.evaluate import Evaluation
 from wallkit.pipelines.localize import Request, prepare
 from wallkit.pipelines.map.verdicts import Selection, judge
 from wallkit.pipelines.report import compare_runs
 from wallkit.pipelines.run_folder import RunRecord, read_json, write_json
-from wallkit.pipelines.seeds import run_seed
+from wallkit.pipelines.seeds import run_seed, write_seeds
 from wallkit.pipelines.shared import Shared
 from wallkit.report.compare import CompareData
 from wallkit.report.demo import DemoData, demo_html
@@ -35,6 +35,7 @@ SAMPLE = Path(wallkit.sample.__file__).parent
 LOG, MAP, CALIBRATION = SAMPLE / "log.mcap", SAMPLE / "floor.wkmap.urdf", SAMPLE / "camera.toml"
 # a start of its own each, for the spread over runs; the first has the pictures and the report
 SEEDS = 3
+FIRST = "seed-0"
 # after the robot was found: until then the error is metres, and says more about the first guess than about the method
 COMPARED = ("ate_median_m", "updates_to_converge")
 # of a class with fewer returns in a run, the share says little
@@ -91,7 +92,7 @@ class Demo:
 def run_demo(out: Path, observe: Callable[[str], None] = lambda doing: None) -> Demo:
     """Judge the sample's map and calibration, localize it with every method, and write each run and the comparison."""
     observe("validating the map")
-    config = load_config(None).config
+    config = default_config().config
     (judged,) = judge([MAP], Selection(config.rules, datetime.date.today()))
     observe("verifying the calibration")
     verified = verify_calibration(VerifyRequest((LOG,), CALIBRATION))
@@ -102,7 +103,8 @@ def run_demo(out: Path, observe: Callable[[str], None] = lambda doing: None) -> 
     data = compare_runs(list(runs.values()), list(runs), config.evaluate, seed=0, keys=COMPARED)
     (first, _), *_ = runs["basic"]
     methods = {name: {"settings": list(m.words), "model": m.model} for name, m in METHODS.items()}
-    write_json(out / "run.json", {"schema": 2, "wallkit": first.run["wallkit"], "seeds": SEEDS, "methods": methods})
+    told = {"schema": 2, "command": "demo", "wallkit": first.run["wallkit"], "seeds": SEEDS, "methods": methods}
+    write_json(out / "run.json", told)
     found = Demo(judged, verified.calibration, verified.evidence.target_free, runs, data)
     write_page(out / "report.html", demo_html(_page(found)))
     return found
@@ -126,7 +128,7 @@ def _page(found: Demo) -> DemoData:
     verdict = f"Nearest is {nearest}. Is it sure? {sure[0].upper()}{sure[1:]}."
     compared = replace(found.data, title="A robot among six people", verdict=verdict)
     (record, _), *_ = found.runs[FILTERED]
-    pages = tuple((name, f"{folder_of(name)}/report.html") for name in found.runs)
+    pages = tuple((name, f"{folder_of(name)}/{FIRST}/report.html") for name in found.runs)
     return DemoData(answers(found)[:3], compared, record.photos, pages)
 
 
@@ -151,15 +153,17 @@ def folder_of(method: str) -> str:
 
 
 def _localized(method: Method, folder: Path, shared: Shared) -> Seeds:
-    """Every seed; the first with its report and pictures."""
-    loaded = load_config(None, method.words)
+    """Every seed, in folders like those of `localize --seeds`; the first with its report and pictures."""
+    loaded = default_config(method.words)
     cameras = CameraRequest((CALIBRATION,), model=method.model) if method.model else CameraRequest()
     request = Request((LOG,), MAP, init="global", cameras=cameras)
     prepared = prepare(request, loaded.config, seeds=SEEDS, shared=shared)
-    folder.mkdir(parents=True)
-    found = [run_seed(prepared, loaded, folder)]
+    (folder / FIRST).mkdir(parents=True)
+    found = [run_seed(prepared, loaded, folder / FIRST)]
     found += [run_seed(prepared, loaded, folder / f"seed-{seed}", seed=seed) for seed in range(1, SEEDS)]
-    return [(record, evaluation) for _, record, evaluation in found]
+    records = [(record, evaluation) for _, record, evaluation in found]
+    write_seeds(folder, records)
+    return records
 
 
 # ------------------------------------------------------------------------------------------------ is it as expected?

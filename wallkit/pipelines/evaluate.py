@@ -20,8 +20,11 @@ from wallkit.evaluate.resources import update_times
 class EvaluateSettings:
     """The [evaluate] table of wallkit.toml."""
 
-    truth_gap_s: float = setting(0.5, "truth is interpolated to a scan if a true pose is this near in time", low=0)
-    truth_offset_s: float = setting(0.0, "added to the stamps of the truth")
+    # seconds are counted as int64 nanoseconds, which end at 9e9 s and hold today's stamps of 1.8e9 s as well
+    truth_gap_s: float = setting(
+        0.5, "truth is interpolated to a scan if a true pose is this near in time", low=0, high=4e9
+    )
+    truth_offset_s: float = setting(0.0, "added to the stamps of the truth", low=-4e9, high=4e9)
     converged_m: float = setting(0.5, "error under which an estimate counts as converged", low=0)
     converged_deg: float = setting(10.0, "the same for the heading", low=0)
     lost_m: float = setting(1.0, "error over which an estimate is wrong", low=0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +12,11 @@ from wallkit.core.types import Health
 from wallkit.errors import WallkitError
 from wallkit.evaluate.statistics import compare_errors, compare_seeds, summarise
 from wallkit.pipelines.evaluate import EvaluateSettings, Evaluation
+from wallkit.pipelines.pairing import Seeds, check_one_log, pair_seeds
 from wallkit.pipelines.run_folder import RunRecord, ceiling_of
 from wallkit.report.compare import CompareData, Contender
 from wallkit.report.data import ReportData, Tone
 from wallkit.report.html import write_comparison, write_report
-
-Seeds = Sequence[tuple[RunRecord, Evaluation]]
 
 COMPARED = ("ate_rmse_m", "heading_error_mean_deg")
 COMPARED_IN_PAPERS = ("error_mean_m", "updates_to_converge")
@@ -85,10 +84,11 @@ def compare_runs(
         keys: what is tested, over the same seeds.
 
     Raises:
-        WallkitError: fewer than two.
+        WallkitError: fewer than two, or of different logs.
     """
     if len(runs) < 2:
         raise WallkitError("one run cannot be compared", hint="name two or more result folders")
+    check_one_log(runs, names)
     contenders = []
     for name, seeds in zip(names, runs, strict=True):
         record, evaluation = seeds[0]
@@ -96,12 +96,13 @@ def compare_runs(
         metrics = {**evaluation.metrics, **record.resources}
         contenders.append(Contender(name, metrics, spreads, report_data(record, evaluation, settings)))
     rng = np.random.default_rng(np.random.SeedSequence(seed))
-    differences = []
+    differences, notes = [], []
     for name, seeds in zip(names[1:], runs[1:], strict=True):
-        for comparison in _differences(rng, runs[0], seeds, keys):
-            differences.append((names[0], name, comparison))
+        found, said = _differences(rng, runs[0], seeds, (names[0], name), keys)
+        differences += [(names[0], name, comparison) for comparison in found]
+        notes += said
     best = _best_of(contenders)
-    return CompareData(" against ".join(names), best, tuple(contenders), tuple(differences))
+    return CompareData(" against ".join(names), best, tuple(contenders), tuple(differences), tuple(notes))
 
 
 def write_compare_report(path: Path, data: CompareData) -> None:
@@ -109,22 +110,33 @@ def write_compare_report(path: Path, data: CompareData) -> None:
     write_comparison(path, data)
 
 
-def _differences(rng: np.random.Generator, a: Seeds, b: Seeds, keys: Sequence[str]) -> Iterator[Comparison]:
-    """Metric by metric over the same seeds, or scan by scan for single runs of one log."""
-    errors_a, errors_b = a[0][1].errors, b[0][1].errors
-    if len(a) > 1 and len(a) == len(b):
+def _differences(
+    rng: np.random.Generator, a: Seeds, b: Seeds, names: tuple[str, str], keys: Sequence[str]
+) -> tuple[list[Comparison], list[str]]:
+    """Metric by metric over the seeds both have, or scan by scan for a single pair; and in words what was not tested."""
+    left, right, alone = pair_seeds(a, b, names)
+    found, notes = [], list(alone)
+    if len(left) > 1:
         for key in keys:
-            left, right = _values(key, a), _values(key, b)
-            if len(left) == len(right) == len(a):
-                yield compare_seeds(rng, left, right)
-    elif errors_a is not None and errors_b is not None:
-        yield compare_errors(rng, errors_a, errors_b)
+            values_a, values_b = _values(key, left), _values(key, right)
+            known = len(values_a) + len(values_b)
+            if known == len(left) + len(right):
+                found.append(compare_seeds(rng, values_a, values_b))
+            elif known:
+                # to test only the seeds that have it would leave out the bad ones
+                without = f"{len(left) + len(right) - known} of {len(left) + len(right)} runs have none"
+                notes.append(f"{key} of {names[0]} and {names[1]} is not tested: {without}")
+    elif left:
+        errors_a, errors_b = left[0][1].errors, right[0][1].errors
+        if errors_a is not None and errors_b is not None:
+            found.append(compare_errors(rng, errors_a, errors_b))
+    return found, notes
 
 
 def _values(key: str, seeds: Seeds) -> list[Value]:
     """One metric of every seed that has it."""
-    found = (e.metrics.get(key) for _, e in seeds)
-    return [v for v in found if v is not None and v.value is not None]
+    metrics = (e.metrics.get(key) for _, e in seeds)
+    return [v for v in metrics if v is not None and v.value is not None]
 
 
 def _best_of(contenders: Sequence[Contender]) -> str:

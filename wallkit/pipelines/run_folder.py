@@ -115,6 +115,13 @@ def read_run(folder: Path) -> RunRecord:
             "no result of wallkit (run.json is missing)", where=folder, hint="name an --out of wallkit localize"
         )
     run = read_json(folder / "run.json")
+    # every command of wallkit leaves a run.json
+    if "logs" not in run or "config" not in run:
+        command = str(run.get("command", "")).removeprefix("wallkit ")
+        made_by = f": run.json is of wallkit {command}" if command else ""
+        inside = [path.name for path in results_in(folder)]
+        hint = f"name one of {', '.join(inside)} in it" if inside else "name an --out of wallkit localize"
+        raise WallkitError(f"no result of wallkit localize{made_by}", where=folder, hint=hint)
     truth, odometry = folder / "truth.tum", folder / "odometry.tum"
     return RunRecord(
         " + ".join(Path(log).name for log in run["logs"]),
@@ -127,6 +134,25 @@ def read_run(folder: Path) -> RunRecord:
         _read_snapshots(folder / "snapshots.npz"),
         read_overlays(folder),
     )
+
+
+def results_in(folder: Path) -> list[Path]:
+    """The result folders of wallkit localize in a folder, by name; what other commands left beside them is passed over."""
+    return sorted(path.parent for path in folder.glob("*/run.json") if "command" not in read_json(path))
+
+
+def seed_folders(folder: Path) -> list[Path]:
+    """The folders of the seeds in a result folder, by seed; none if it is that of a single run.
+
+    Raises:
+        WallkitError: one is called like a seed and has no number.
+    """
+    found = [path for path in folder.glob("seed-*") if path.is_dir()]
+    for path in found:
+        if not path.name.removeprefix("seed-").isdecimal():
+            message = f"'{path.name}' is not the folder of a seed: 'seed-' and a number is wanted"
+            raise WallkitError(message, where=folder, hint="give it another name, or move it away")
+    return sorted(found, key=lambda path: int(path.name.removeprefix("seed-")))
 
 
 def ceiling_of(run: Mapping[str, Any]) -> CeilingMap | None:
@@ -165,7 +191,10 @@ def read_json(path: Path) -> dict[str, Any]:
         document = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise WallkitError(f"cannot be read: {error}", where=path, hint="run wallkit localize again") from error
-    return dict(document)
+    if not isinstance(document, dict):
+        message = f"is {type(document).__name__} in JSON, where an object is wanted"
+        raise WallkitError(message, where=path, hint="run wallkit localize again")
+    return document
 
 
 def sha256(path: Path) -> str:

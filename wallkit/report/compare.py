@@ -13,7 +13,7 @@ from wallkit.core.types import Float64Array
 from wallkit.report import canvas
 from wallkit.report.canvas import Key
 from wallkit.report.data import Picture, ReportData
-from wallkit.report.wording import number_text, spread_text, value_text
+from wallkit.report.wording import interval_text, number_text, spread_text, value_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,12 +56,14 @@ class CompareData:
     Attributes:
         verdict: the answer in one sentence.
         differences: (name of a, name of b, comparison) for each pair that was tested.
+        notes: what was left out of the tests, a sentence each.
     """
 
     title: str
     verdict: str
     contenders: tuple[Contender, ...]
     differences: tuple[tuple[str, str, Comparison], ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,12 +96,12 @@ def difference_rows(data: CompareData) -> list[tuple[str, str, str]]:
     """(metric, what differs, how sure) for each comparison."""
     rows = []
     for a, b, found in data.differences:
-        low, high = number_text(found.low, found.unit), number_text(found.high, found.unit)
         size = number_text(abs(found.difference), found.unit)
         which = "more" if found.difference > 0 else "less"
         p_value = "p < 0.001" if found.p_value < 0.001 else f"p = {found.p_value:.3f}"
         verdict = {"a": f"{a} is better", "b": f"{b} is better", "neither": "no difference can be told"}[found.better]
-        what = f"{verdict}: {b} has {size} {which} than {a} (95 % between {low} and {high})"
+        interval = interval_text(found, number_text)
+        what = f"{verdict}: {b} has {size} {which} than {a} ({interval})"
         rows.append((found.key, what, f"{p_value}, {found.pairs} pairs, {found.method}"))
     return rows
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from wallkit.report.compare import CompareData, Contender
-from wallkit.report.wording import number_text
+from wallkit.report.wording import interval_text, number_text
 
 MISSING = "-"
 
@@ -64,8 +64,7 @@ def paper_differences(data: CompareData) -> list[str]:
     found = []
     for a, b, c in data.differences:
         verdict = {"a": f"{a} is better", "b": f"{b} is better", "neither": "no difference can be told"}[c.better]
-        low, high = paper_text(c.low, c.unit), paper_text(c.high, c.unit)
-        what = f"{c.key}: {verdict}: {b} - {a} = {paper_text(c.difference, c.unit)} (95 % between {low} and {high})"
+        what = f"{c.key}: {verdict}: {b} - {a} = {paper_text(c.difference, c.unit)} ({interval_text(c, paper_text)})"
         found.append(f"{what} [p = {c.p_value:.2g}, {c.pairs} pairs, {c.method}]")
     return found
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from wallkit.core.results import Episode, Spread, Value
+from wallkit.core.results import FEWEST_PAIRS, Comparison, Episode, Spread, Value
 from wallkit.core.steps import Steps, health_runs
 from wallkit.core.types import Health
 from wallkit.report.canvas import time_text
@@ -58,6 +58,13 @@ def value_text(value: Value) -> str:
     if value.value is None:
         return "never" if value.key in _NEVER else "none"
     return number_text(value.value, value.unit)
+
+
+def interval_text(found: Comparison, text: Callable[[float, str], str]) -> str:
+    """Between what the difference lies, its numbers as `text` writes them; or why that is not known."""
+    if found.low is None or found.high is None:
+        return f"no 95 % interval of fewer than {FEWEST_PAIRS} pairs"
+    return f"95 % between {text(found.low, found.unit)} and {text(found.high, found.unit)}"
 
 
 def number_text(number: float, unit: str) -> str:

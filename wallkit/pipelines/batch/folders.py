@@ -10,13 +10,13 @@ from wallkit.core.results import Value
 from wallkit.pipelines.batch.gather import Row, gather
 from wallkit.pipelines.batch.labels import labels_of_runs
 from wallkit.pipelines.batch.runs import DONE, FAILED, Runs
-from wallkit.pipelines.run_folder import read_json
+from wallkit.pipelines.run_folder import read_json, results_in, seed_folders
 from wallkit.report.data import flatten
 
 
 def is_folder_of_runs(folder: Path) -> bool:
     """Whether a folder holds result folders, and is none itself."""
-    return not (folder / "run.json").is_file() and any(folder.glob("*/run.json"))
+    return not (folder / "run.json").is_file() and bool(results_in(folder))
 
 
 def configurations_in(folder: Path) -> tuple[Path, ...]:
@@ -38,9 +38,12 @@ def read_folders(folders: Sequence[Path], names: Sequence[str]) -> Runs:
 
 
 def _rows(folder: Path, name: str, labels: dict[str, Value]) -> Iterator[Row]:
+    results = results_in(folder)
     for log in sorted(path for path in folder.iterdir() if path.is_dir()):
+        if log not in results and (log / "run.json").is_file():
+            continue
         # one that was stopped has seeds without numbers, or nothing at all
-        for run in sorted(log.glob("seed-*"), key=_number) or [log]:
+        for run in seed_folders(log) or [log]:
             if (run / "metrics.json").is_file():
                 answer, config = read_json(run / "metrics.json"), read_json(run / "run.json")["config"]
                 metrics = {key: answer[key] for key in labels if key in answer}
