@@ -129,6 +129,7 @@ def test_record_one_of_poses_csv_is_left_out(data):
     assert np.linalg.norm(result.T[:3, 3] - run.result.T[:3, 3]) < 0.02
 
 
+@pytest.mark.long
 def test_turtlebot_refuses_six_and_answers_three(data, camera_2d, tmp_path):
     """REF: three of six directions; SE(2) yaw 1.37 deg, tx -18.7, tz -86.1 mm, spread over views 2.6 deg and 21 mm."""
     here = data / "calib" / "acfr_2d"

@@ -143,6 +143,7 @@ def turtlebot(data, camera: Path, square: str, tmp_path):
     return [here / "images", "--scans", here / "lasers", "--calib", path, "--lidar-sigma", "lds-01"]
 
 
+@pytest.mark.long
 def test_turtlebot_cannot_tell_and_names_three_directions(data, camera_2d, tmp_path):
     words = turtlebot(data, camera_2d, "0.019", tmp_path)
     found = asked(*words, "--board", "chessboard:11x8:0.019", code=4)

@@ -97,6 +97,7 @@ def test_logs_become_a_dataset_after_a_review(logs, tmp_path, wallkit):
     assert len(pairs_of((plain, other), "all")) == 17 + 2 * train
 
 
+@pytest.mark.long
 def test_poses_scans_and_labels_are_those_of_the_log(logs, tmp_path, wallkit):
     done = wallkit("dataset", "from-log", logs / "run1/log.mcap", "-o", tmp_path / "set", "--json")
     assert done.code == 0, done.err
@@ -131,6 +132,7 @@ def test_a_log_without_masks_has_no_labels(logs, tmp_path, wallkit):
     assert "9 pictures have no labels" in both.err
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("drops", "said"),
     [

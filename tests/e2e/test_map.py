@@ -310,6 +310,7 @@ def test_the_example_is_sound_and_is_listed(run_here, data):
     assert "wall_s" not in {row["link"] for row in rows}
 
 
+@pytest.mark.long
 @pytest.mark.data
 def test_no_faulty_file_brings_a_traceback(wallkit, data):
     files = sorted((data / "maps/malformed").glob("*/*.urdf"))

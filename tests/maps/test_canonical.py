@@ -105,6 +105,7 @@ def quoted(value: str, single: bool) -> str:
     return quote + escaped(value) + quote
 
 
+@pytest.mark.long
 @settings(max_examples=150, deadline=None)
 @given(st.lists(st.one_of(elements(), COMMENTS, SPACE), max_size=5))
 def test_any_document_formats_once_and_for_all_and_means_the_same(pieces):

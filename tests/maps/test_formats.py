@@ -84,6 +84,7 @@ def test_figures_that_do_not_exist_are_null_in_json():
     assert sarif_results(json.loads(written("sarif", file)), "WK-S023")[0]["properties"]["xyz"] == [None, 1.0]
 
 
+@pytest.mark.long
 @pytest.mark.data
 def test_every_faulty_file_can_be_written_in_every_format(data):
     files = [judged(path.read_bytes(), path.name) for path in sorted((data / "maps/malformed").glob("*/*.urdf"))]

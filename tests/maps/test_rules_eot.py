@@ -153,6 +153,7 @@ def test_the_apartment_has_rounded_angles_and_nothing_worse(data):
 # -------------------------------------------------------------------------------------- any slip, speed
 
 
+@pytest.mark.long
 @settings(max_examples=120, deadline=None)
 @given(st.integers(0, 2**31))
 def test_no_slips_in_the_numbers_make_the_rules_raise(seed):

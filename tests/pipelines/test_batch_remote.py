@@ -171,6 +171,7 @@ def _refuse(self, path):
     raise PermissionError("no")
 
 
+@pytest.mark.long
 def test_the_same_batch_from_addresses_and_what_vanishes_or_changes_fails_alone(memory, tmp_path):
     for name in "abc":
         put_sample(memory, f"/fleet/{name}")

@@ -41,6 +41,7 @@ def expected():
     return {**every, "methods": {name: every["methods"][name] for name in ("basic", FILTERED)}}
 
 
+@pytest.mark.long
 def test_a_filter_that_does_not_filter_is_noticed_however_small_the_error(found, expected):
     said = surprises(found, expected)
     assert said

@@ -115,6 +115,7 @@ PERFECT_LIDAR = [
 ]
 
 
+@pytest.mark.long
 def test_without_noise_of_ranges_the_truth_is_recovered(gl):
     """What is left is the camera's noise; before squares began where pixels do, forward was half a millimetre off."""
     words = [*PERFECT_LIDAR, "lidar.frame=laser"]
