@@ -156,6 +156,11 @@ def test_patterns_that_do_not_fit():
     assert sorted(["b12", "b2", "10", "9", "a"], key=natural) == ["9", "10", "a", "b2", "b12"]
 
 
+def test_runs_without_a_single_number():
+    with pytest.raises(WallkitError, match=f"none of the {EACH} runs has a number to compare"):
+        told(replace(drawn({"basic": 1.0}), columns={}))
+
+
 def test_a_batch_that_has_nothing_yet():
     every = [row.key.split("/") for row in drawn_rows({"basic": 1.0})]
     runs = drawn({"basic": 1.0}, failing=[(name, log, int(seed)) for name, log, seed in every])

@@ -55,7 +55,7 @@ def compare_batch(runs: Runs, question: Question, *, title: str) -> BatchData:
     """Everything that is asked.
 
     Raises:
-        WallkitError: no run has ended, or a configuration, metric or fact does not exist.
+        WallkitError: no run has ended or has a number, or a configuration, metric or fact does not exist.
     """
     if not runs.is_done.any():
         raise WallkitError(
@@ -64,6 +64,9 @@ def compare_batch(runs: Runs, question: Question, *, title: str) -> BatchData:
             hint="start the batch again",
         )
     metrics = question.metrics or tuple(key for key in (MAIN, WELL, *runs.columns) if key in runs.columns)[:1]
+    if not metrics:
+        said = f"none of the {len(runs)} runs has a number to compare"
+        raise WallkitError(said, where=title, hint="is there truth? `wallkit localize LOG --truth FILE`")
     labels = {key: runs.column(key).label for key in metrics}
     base = index_of(runs, question.baseline) if question.baseline else 0
     rng = np.random.default_rng(np.random.SeedSequence(question.seed))
