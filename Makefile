@@ -4,7 +4,7 @@ demo:
 test:
 	pytest -q
 long:
-	pytest -q -m long
+	pytest -q -m 'long and not slow'
 slow:
 	pytest -q -m slow
 guides:
