@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from tests.simulate.conftest import gl
 from wallkit.dataset.labels import classes_from_png
 from wallkit.dataset.polygons import mask_from_polygons, polygons_from_yolo
 from wallkit.dataset.rle import counts_from_text, mask_from_counts
+from wallkit.errors import OutputError
 from wallkit.maps.draft.write import write_draft
 from wallkit.maps.rules import validate
 from wallkit.pipelines.simulate.buildings import random_building
@@ -138,6 +140,10 @@ def test_an_interrupted_run_goes_on_where_it_stopped(made, tmp_path, wallkit, mo
     with pytest.raises(KeyboardInterrupt):
         pipeline.simulate_dataset(request, tmp_path / "set", overwrite=True)
     assert sorted(path.name for path in (tmp_path / "set").iterdir()) == ["old.txt", "run.json"]
+    (tmp_path / "set").rename(tmp_path / "kept")
+    with pytest.raises(OutputError, match="an interrupted set of other settings: images 6, now 8"):
+        pipeline.simulate_dataset(replace(request, images=8), tmp_path / "set")
+    (tmp_path / "kept").rename(tmp_path / "set")
     done = wallkit("simulate", "dataset", *WORDS, "-o", tmp_path / "set", "--overwrite", "--json")
     assert done.code == 0, done.err
     assert done.json["resumed"] == 1

@@ -10,7 +10,7 @@ import pytest
 from tests.train.flat import NAMES, flat_set
 from wallkit.dataset.read import read_training_sets
 from wallkit.errors import ModelError
-from wallkit.pipelines.model.evaluate import NOTHING, evaluate_model, evaluate_on, minimum_of
+from wallkit.pipelines.model.evaluate import NOTHING, evaluate_model, minimum_of
 from wallkit.segment.fixture import USUAL, oracle
 
 
@@ -31,7 +31,9 @@ def iou(judged, name):
 
 def test_an_oracle_is_right_about_every_class(tmp_path, rooms):
     heard: list[int] = []
-    judged = evaluate_model(model(tmp_path, USUAL), rooms, "val", sheet=tmp_path / "sheet.png", progress=heard.append)
+    judged = evaluate_model(
+        model(tmp_path, USUAL), read_training_sets([rooms]), "val", sheet=tmp_path / "sheet.png", progress=heard.append
+    )
     assert judged.pictures == 6
     assert heard == [1, 2, 3, 4, 5, 6]
     # cells of the oracle are coarser than pixels, so borders are not
@@ -46,15 +48,15 @@ def test_several_sets_are_judged_as_one(tmp_path, rooms):
     more = flat_set(tmp_path / "more", train=1, val=3, seed=9)
     path = model(tmp_path, USUAL)
     sets = read_training_sets((rooms, more))
-    judged = evaluate_on(sets, path, "val", sheet=tmp_path / "sheet.png")
-    apart = [evaluate_model(path, one, "val") for one in (rooms, more)]
+    judged = evaluate_model(path, sets, "val", sheet=tmp_path / "sheet.png")
+    apart = [evaluate_model(path, read_training_sets([one]), "val") for one in (rooms, more)]
     assert judged.pictures == 6 + 3
     np.testing.assert_array_equal(judged.matrix, sum(one.matrix for one in apart))
 
 
 def test_two_classes_exchanged_are_never_found(tmp_path, rooms):
     exchanged = {**USUAL, "door": USUAL["sink"], "sink": USUAL["door"]}
-    judged = evaluate_model(model(tmp_path, exchanged), rooms, "val")
+    judged = evaluate_model(model(tmp_path, exchanged), read_training_sets([rooms]), "val")
     assert iou(judged, "door") < 0.05
     assert iou(judged, "toilet") > 0.8
     assert judged.document["classes"]["door"]["mistaken"]["as"] == "sink"
@@ -62,13 +64,13 @@ def test_two_classes_exchanged_are_never_found(tmp_path, rooms):
 
 def test_a_class_of_another_name_counts_by_its_role(tmp_path, rooms):
     renamed = {{"wall": "Wall-Tile", "person": "pedestrian"}.get(name, name): rgb for name, rgb in USUAL.items()}
-    judged = evaluate_model(model(tmp_path, renamed), rooms, "val")
+    judged = evaluate_model(model(tmp_path, renamed), read_training_sets([rooms]), "val")
     assert min(iou(judged, name) for name in ("wall", "person")) > 0.8
 
 
 def test_what_a_model_does_not_know_is_nothing(tmp_path, rooms):
     known = {name: rgb for name, rgb in USUAL.items() if name != "door"}
-    judged = evaluate_model(model(tmp_path, known), rooms, "val")
+    judged = evaluate_model(model(tmp_path, known), read_training_sets([rooms]), "val")
     assert judged.without == ("door",)
     assert iou(judged, "door") == 0
     # a door is of no colour that it knows
@@ -77,17 +79,17 @@ def test_what_a_model_does_not_know_is_nothing(tmp_path, rooms):
 
 
 def test_yolo_models_are_judged_the_same_way(tmp_path, rooms):
-    judged = evaluate_model(model(tmp_path, USUAL, "yolo-rows"), rooms, "val")
+    judged = evaluate_model(model(tmp_path, USUAL, "yolo-rows"), read_training_sets([rooms]), "val")
     assert iou(judged, "wall") > 0.6
 
 
 def test_a_model_of_other_things_is_refused(tmp_path, rooms):
     with pytest.raises(ModelError, match=r"none of its classes \(tree"):
-        evaluate_model(model(tmp_path, {"tree": (1, 2, 3), "river": (200, 2, 3)}), rooms, "val")
+        evaluate_model(model(tmp_path, {"tree": (1, 2, 3), "river": (200, 2, 3)}), read_training_sets([rooms]), "val")
 
 
 def test_demands_on_classes(tmp_path, rooms):
-    judged = evaluate_model(model(tmp_path, USUAL), rooms, "val")
+    judged = evaluate_model(model(tmp_path, USUAL), read_training_sets([rooms]), "val")
     assert judged.short_of({"wall": 0.5}) == {}
     assert judged.short_of({"wall": 1.0})["wall"][1] == 1.0
     with pytest.raises(ModelError, match="'wal' is no class") as caught:

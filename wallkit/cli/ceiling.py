@@ -88,9 +88,15 @@ def fit(
 @click.option(
     "--poses", metavar="RUN|FILE.tum|truth", help="Where the robot was in the map.  [default: the log's truth]"
 )
-@click.option("--height", "height_m", type=float, metavar="M", help="Of the ceiling above the floor; else it is found.")
-@click.option("--resolution", type=float, default=0.02, show_default=True, metavar="M", help="Side of a pixel.")
-@click.option("--every", type=float, default=0.1, show_default=True, metavar="M", help="An image every so many metres.")
+@click.option(
+    "--height", "height_m", type=common.Number(), metavar="M", help="Of the ceiling above the floor; else it is found."
+)
+@click.option(
+    "--resolution", type=common.Number(), default=0.02, show_default=True, metavar="M", help="Side of a pixel."
+)
+@click.option(
+    "--every", type=common.Number(), default=0.1, show_default=True, metavar="M", help="An image every so many metres."
+)
 @click.option("--as-exposed", is_flag=True, help="Do not bring images to one brightness.")
 @_robot_options
 @common.out_option

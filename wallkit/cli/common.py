@@ -70,6 +70,22 @@ def _terminated_as_by_ctrl_c() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
 
 
+class Number(click.FloatRange):
+    """A finite number, in a range if one is given: click lets "nan" through, as it is beyond no end."""
+
+    name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value} is no finite number.", param, ctx)
+        return number
+
+    def _describe_range(self) -> str:
+        """For the help; click describes a range without ends as well."""
+        return "" if self.min is None and self.max is None else super()._describe_range()
+
+
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 
 out_option = click.option("-o", "--out", type=click.Path(path_type=Path), metavar="PATH", help="Where the results go.")

@@ -37,7 +37,9 @@ def dataset() -> None:
     metavar="N",
     help="Add N variants of each training picture, beside.",
 )
-@click.option("--val", type=float, default=0.2, show_default=True, metavar="SHARE", help="Of logs, for validation.")
+@click.option(
+    "--val", type=common.Number(), default=0.2, show_default=True, metavar="SHARE", help="Of logs, for validation."
+)
 @click.option("--classes", type=click.Path(path_type=Path), metavar="TOML", help="What counts as what.")
 @common.seed_option
 @common.out_option

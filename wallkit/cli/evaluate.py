@@ -22,8 +22,8 @@ truth_option = click.option(
 @click.command()
 @RUNS
 @truth_option
-@click.option("--t-offset", type=float, metavar="S", help="Added to the stamps of the truth.")
-@click.option("--max-ate-m", type=float, metavar="M", help="Exit 1 if the rmse of any run is above.")
+@click.option("--t-offset", type=common.Number(), metavar="S", help="Added to the stamps of the truth.")
+@click.option("--max-ate-m", type=common.Number(), metavar="M", help="Exit 1 if the rmse of any run is above.")
 @click.option("--evo", is_flag=True, help="Also write result zips for evo_res into --out.")
 @common.out_option
 @common.overwrite_option

@@ -70,8 +70,8 @@ camera_options = common.options(
 @topic_options
 @camera_options
 @up_camera_options
-@click.option("--start", type=float, metavar="S", help="Begin so many seconds after the first scan.")
-@click.option("--end", type=float, metavar="S", help="End so many seconds after the first scan.")
+@click.option("--start", type=common.Number(), metavar="S", help="Begin so many seconds after the first scan.")
+@click.option("--end", type=common.Number(), metavar="S", help="End so many seconds after the first scan.")
 @click.option("--particles", type=int, metavar="N", help="Particles (localize.particles).")
 @click.option(
     "--seeds", type=click.IntRange(min=1), default=1, metavar="N", help="Run with N seeds, starting at --seed."

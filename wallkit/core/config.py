@@ -27,9 +27,8 @@ Registry = Mapping[str, Any]
 # ------------------------------------------------------------------------------------- declaring settings
 
 
-# the unit of a setting is the suffix of its name
 def setting(default: Any, doc: str, *, low: float | None = None, high: float | None = None) -> Any:
-    """A field with a default, one line of documentation and an inclusive range, infinite only if an end is."""
+    """A field with a default, one line of documentation and an inclusive range; the unit is the name's suffix."""
     return field(default=default, metadata={"doc": doc, "low": low, "high": high})
 
 

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wallkit.core.results import FEWEST_PAIRS
 from wallkit.core.types import BoolArray, Float64Array, Int64Array
 from wallkit.evaluate.statistics import SIGNIFICANT_P, small_sample_z
 
-# with five, no signed-rank test reaches p = 0.05 either
-FEWEST_LOGS = 6
 _NO_NOISE = 1e-24
 _Z = 1.959964
 
@@ -53,8 +52,8 @@ def find_best(rng: np.random.Generator, losses: Float64Array, *, resamples: int 
     # configurations that give the very same numbers have neither difference nor noise
     sd = np.sqrt(np.maximum(own[:, None] + own[None, :] - 2 * covariance, _NO_NOISE))
     # drawn again, few logs vary less than logs do
-    scale = -small_sample_z(max(logs, FEWEST_LOGS)) / _Z
-    while len(alive) > 1 and logs >= FEWEST_LOGS:
+    scale = -small_sample_z(max(logs, FEWEST_PAIRS)) / _Z
+    while len(alive) > 1 and logs >= FEWEST_PAIRS:
         excess = (means[alive, None] - means[None, alive]) / sd[np.ix_(alive, alive)]
         worst = int(np.argmax(excess.max(axis=1)))
         noise = _largest(centred[:, alive], sd[np.ix_(alive, alive)])

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from wallkit.core.results import Distribution
+from wallkit.core.results import FEWEST_PAIRS, Distribution
 from wallkit.report.batch import BatchData, Factor, Level, Summary
-from wallkit.report.batch_words import FEWEST_LOGS, count_text, mean_text, word_of
+from wallkit.report.batch_words import count_text, mean_text, word_of
 from wallkit.report.paper import MISSING, paper_text
 
 Table = tuple[list[str], list[list[str]]]
@@ -70,7 +70,7 @@ def factor_table(factor: Factor, key: str) -> Table:
 def candidate_table(data: BatchData) -> Table | None:
     """Those that may be the best with their settings; None where none can be told from another."""
     contest = data.contest
-    if contest is None or contest.logs < FEWEST_LOGS or all(c.may_be for c in contest.candidates):
+    if contest is None or contest.logs < FEWEST_PAIRS or all(c.may_be for c in contest.candidates):
         return None
     able = [c for c in contest.candidates if c.may_be]
     keys = list(dict.fromkeys(key for c in able for key in data.settings.get(c.name, {})))

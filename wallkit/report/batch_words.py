@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from wallkit.core.results import Interval, Paired
+from wallkit.core.results import FEWEST_PAIRS, Interval, Paired
 from wallkit.report.batch import BatchData, Candidate, Contest, Difference, OneRun
 from wallkit.report.paper import paper_text
 
@@ -25,7 +25,7 @@ WORDS = {
 }
 # in a sentence: more of it and less of it
 _SIDES = dict.fromkeys(("updates_to_converge", "false_healthy"), ("more", "fewer"))
-_SIGNIFICANT_P, FEWEST_LOGS = 0.05, 6
+_SIGNIFICANT_P = 0.05
 _SHOWN_RUNS, _MOST_SENTENCES = 5, 12
 
 
@@ -115,7 +115,7 @@ def contest_lines(contest: Contest | None, key: str) -> list[str]:
     """Which configurations may be the best."""
     if contest is None:
         return ["The best cannot be named: no two logs have a run of every configuration."]
-    if contest.logs < FEWEST_LOGS:
+    if contest.logs < FEWEST_PAIRS:
         return [f"The best cannot be named: {count_text(contest.logs, 'log')} that all have are too few."]
     able = [c for c in contest.candidates if c.may_be]
     of = f"over {contest.logs} of {contest.of_logs} logs (those that every configuration has)"

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 @click.option(
     "--ceiling", type=click.Path(path_type=Path), metavar="FILE", help="Of all logs; else the one in each folder."
 )
-@click.option("--end", "end_s", type=click.FloatRange(min=20), metavar="S", help="Only so many seconds of every log.")
+@click.option("--end", "end_s", type=common.Number(min=20), metavar="S", help="Only so many seconds of every log.")
 @click.option(
     "--rows",
     type=click.Path(path_type=Path),

@@ -27,7 +27,11 @@ def _counts(_: click.Context, __: click.Parameter, value: str) -> tuple[int, ...
     "--lidar", type=click.Choice(["2D", "3D", "both"]), default="both", show_default=True, help="Kind of LiDAR."
 )
 @click.option(
-    "--excess", type=float, default=1.0, show_default=True, help="How much larger board poses err than they say."
+    "--excess",
+    type=common.Number(),
+    default=1.0,
+    show_default=True,
+    help="How much larger board poses err than they say.",
 )
 @common.quiet_option
 @common.json_option

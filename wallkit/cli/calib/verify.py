@@ -29,7 +29,9 @@ FILE = click.Path(path_type=Path)
 @click.option("--camera-frame", "camera_link", default="", metavar="LINK", help="The optical frame in the URDF.")
 @click.option("--prior", default="1deg,10mm", show_default=True, metavar="TURN,SHIFT", help="Trust in the URDF.")
 @click.option("--room", is_flag=True, help="With --board: ask the room, too; a board and a room that disagree FAIL.")
-@click.option("--lidar-height", type=float, metavar="M", help="Height of a 2-D LiDAR, for the floor line (no board).")
+@click.option(
+    "--lidar-height", type=common.Number(), metavar="M", help="Height of a 2-D LiDAR, for the floor line (no board)."
+)
 @click.option("--scan", "scan_topic", metavar="TOPIC", help="LiDAR topic of a log, when there are several.")
 @click.option("--image", "image_topic", metavar="TOPIC", help="Camera topic of a log, when there are several.")
 @click.option("--report", type=FILE, metavar="FILE", help="Also write an HTML page with overlays and figures.")

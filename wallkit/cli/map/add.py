@@ -293,7 +293,7 @@ def room(
     show_default=True,
     help="What a LiDAR sees of it.",
 )
-@click.option("--p-return", type=float, metavar="P", help="Share of beams on glass that come back.")
+@click.option("--p-return", type=common.Number(), metavar="P", help="Share of beams on glass that come back.")
 @click.option("--movable", is_flag=True, help="It changes place while the map holds.")
 @edit_options
 def class_(

@@ -53,7 +53,7 @@ def fmt(ctx: click.Context, /, files: tuple[Path, ...], check: bool, dry_run: bo
 @click.argument("b", type=PATH, metavar="B")
 @click.option(
     "--tolerance",
-    type=click.FloatRange(min=0.0),
+    type=common.Number(min=0.0),
     default=1e-6,
     show_default=True,
     help="Smaller differences are rounding (m, rad).",

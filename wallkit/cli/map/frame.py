@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from wallkit.cli import common
 from wallkit.cli.map.words import ANGLE, FILE, LENGTH, POSE, edit_options, finish
 
 
@@ -48,7 +49,7 @@ def adopt(
 
 @click.command()
 @FILE
-@click.argument("factor", type=float, metavar="FACTOR")
+@click.argument("factor", type=common.Number(), metavar="FACTOR")
 @click.argument("names", nargs=-1, metavar="[NAME]...")
 @edit_options
 def scale(file: Path, factor: float, names: tuple[str, ...], dry_run: bool, as_json: bool) -> None:

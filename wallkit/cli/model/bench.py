@@ -44,7 +44,7 @@ def _switches(_: click.Context, __: click.Parameter, value: str) -> tuple[bool, 
     "--spin", default="off", show_default=True, callback=_switches, help="Threads wait busily: off, on, or both."
 )
 @click.option(
-    "--rate", "rate_hz", type=click.FloatRange(0.01), default=10, show_default=True, help="Images per second [Hz]."
+    "--rate", "rate_hz", type=common.Number(0.01), default=10, show_default=True, help="Images per second [Hz]."
 )
 @click.option("--rounds", type=click.IntRange(1), default=30, show_default=True, help="Images timed for each row.")
 @click.option("--points", type=click.IntRange(1), default=720, show_default=True, help="LiDAR points labelled in each.")

@@ -57,6 +57,7 @@ def evaluate(
       wallkit model evaluate best.onnx rooms --split all --sheet masks.png
       wallkit model evaluate default rooms --require "wall + partition=0.85" --require person=0.6
     """
+    from wallkit.dataset.read import read_training_set
     from wallkit.pipelines.config import load_config
     from wallkit.pipelines.model.evaluate import evaluate_model, minimum_of
     from wallkit.pipelines.outputs import check_file_out
@@ -65,8 +66,9 @@ def evaluate(
         check_file_out(sheet, overwrite=overwrite)
     least = dict(minimum_of(text) for text in required)
     settings = load_config(config_path, words).config.segment
+    sets = (read_training_set(dataset),)
     with common.progress("pictures", None, quiet=quiet) as update:
-        judged = evaluate_model(model, dataset, split, settings, sheet=sheet, progress=update)
+        judged = evaluate_model(model, sets, split, settings, sheet=sheet, progress=update)
     short = judged.short_of(least)
     if as_json:
         common.emit({"model": model, "dataset": dataset, "split": split, **judged.document, "short": short})

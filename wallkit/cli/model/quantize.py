@@ -26,7 +26,7 @@ FILE = click.Path(path_type=Path)
 )
 @click.option(
     "--min-match",
-    type=click.FloatRange(0, 1),
+    type=common.Number(0, 1),
     default=0.8,
     show_default=True,
     help="Else it is not written: share of things.",

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from wallkit.cli import common
-from wallkit.cli.model.words import FiniteRange
 
 if TYPE_CHECKING:
     from wallkit.train.curves import Epoch
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
 )
 @click.option("--epochs", type=click.IntRange(1), metavar="N", help="Passes; else 30 (YOLO: 50).")
 @click.option("--batch", type=click.IntRange(1), metavar="N", help="Pictures in a step; else 8 (YOLO: 16).")
-@click.option("--rate", type=FiniteRange(0, 1, min_open=True), metavar="X", help="Highest learning rate; else 0.003.")
+@click.option("--rate", type=common.Number(0, 1, min_open=True), metavar="X", help="Highest learning rate; else 0.003.")
 @click.option("--threads", type=click.IntRange(1, 256), default=1, show_default=True, help="Of PyTorch: free cores.")
 @click.option("--yolo", metavar="MODEL", help="YOLO-seg instead: yolov8n-seg.yaml, or a checkpoint to go on from.")
 @click.option(

@@ -40,10 +40,10 @@ picture_options = common.options(
     "--trust", is_flag=True, help="Load all that the checkpoint holds, not only weights: it may run anything."
 )
 @click.option(
-    "--min-match", type=click.FloatRange(0, 1), default=_MATCH, show_default=True, help="Least share of matched things."
+    "--min-match", type=common.Number(0, 1), default=_MATCH, show_default=True, help="Least share of matched things."
 )
 @click.option(
-    "--min-iou", type=click.FloatRange(0, 1), default=_IOU, show_default=True, help="Least mean IoU of their masks."
+    "--min-iou", type=common.Number(0, 1), default=_IOU, show_default=True, help="Least mean IoU of their masks."
 )
 @common.config_option
 @common.set_option

@@ -2,20 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from typing import Any
-
 import click
-
-
-class FiniteRange(click.FloatRange):
-    """A range of numbers that "nan", which compares with nothing, is not in either."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        number = super().convert(value, param, ctx)
-        if math.isnan(number):
-            self.fail(f"{value} is not in the range {self._describe_range()}.", param, ctx)
-        return number
 
 
 def size_from_words(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, int] | None:

@@ -20,11 +20,19 @@ from wallkit.cli.calib.board import board_option
 )
 @click.option("--count", type=click.IntRange(3, 500), default=20, show_default=True, help="Poses of the board.")
 @click.option(
-    "--near", "near_m", type=float, default=0.7, show_default=True, metavar="M", help="Nearest to the camera."
+    "--near", "near_m", type=common.Number(), default=0.7, show_default=True, metavar="M", help="Nearest to the camera."
 )
-@click.option("--far", "far_m", type=float, default=2.2, show_default=True, metavar="M", help="Farthest from it.")
 @click.option(
-    "--tilt", "tilt_deg", type=float, default=45.0, show_default=True, metavar="DEG", help="Most it is tilted."
+    "--far", "far_m", type=common.Number(), default=2.2, show_default=True, metavar="M", help="Farthest from it."
+)
+@click.option(
+    "--tilt",
+    "tilt_deg",
+    type=common.Number(),
+    default=45.0,
+    show_default=True,
+    metavar="DEG",
+    help="Most it is tilted.",
 )
 @click.option(
     "--rings", "ring_count", type=click.IntRange(2, 256), metavar="N", help="A 3-D LiDAR of so many; else a planar one."
@@ -32,7 +40,7 @@ from wallkit.cli.calib.board import board_option
 @click.option(
     "--ring-span",
     "span_deg",
-    type=click.FloatRange(1, 170),
+    type=common.Number(1, 170),
     default=30.0,
     show_default=True,
     metavar="DEG",

@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     "--size", default="640x480", show_default=True, callback=common.pixel_size, metavar="WxH", help="Of a picture [px]."
 )
 @click.option("--per-scene", type=int, default=12, show_default=True, metavar="N", help="Pictures in one scene.")
-@click.option("--val", type=float, default=0.2, show_default=True, metavar="SHARE", help="Of scenes, for validation.")
+@click.option(
+    "--val", type=common.Number(), default=0.2, show_default=True, metavar="SHARE", help="Of scenes, for validation."
+)
 @click.option(
     "--classes", type=click.Path(path_type=Path), metavar="TOML", help="What counts as what; else 12 usual classes."
 )

@@ -37,7 +37,7 @@ simulate.add_command(boards)
     help="What each pixel shows, of all cameras; raster is fast, exact is slow and needs no OpenGL.",
 )
 @click.option("--preview", "as_preview", is_flag=True, help="One PNG of one moment instead of a log.")
-@click.option("--at", "at_s", type=float, metavar="S", help="The moment of --preview; else the middle.")
+@click.option("--at", "at_s", type=common.Number(), metavar="S", help="The moment of --preview; else the middle.")
 @click.option("--jobs", type=click.IntRange(1, 64), default=1, show_default=True, help="Processes that make pictures.")
 @common.set_option
 @common.seed_option

@@ -12,7 +12,7 @@ import numpy as np
 
 from wallkit.core.types import Int64Array, UInt8Array
 from wallkit.dataset.classes import LabelSet
-from wallkit.dataset.read import TrainingSet, pairs_of, read_pair, read_training_set
+from wallkit.dataset.read import TrainingSet, pairs_of, read_pair
 from wallkit.dataset.sheet import Tile, contact_sheet
 from wallkit.errors import ModelError, closest
 from wallkit.pipelines.outputs import write_whole
@@ -83,14 +83,14 @@ class Judged:
 
 def evaluate_model(
     model: Path,
-    dataset: Path,
+    sets: Sequence[TrainingSet],
     split: str,
     settings: SegmentSettings | None = None,
     *,
     sheet: Path | None = None,
     progress: Callable[[int], None] = lambda _: None,
 ) -> Judged:
-    """Runs the model on every picture of a part of a training set.
+    """Runs the model on every picture of a part of training sets whose classes agree, pooled.
 
     Classes are matched by name, else by what they count as; so a model with other words can be judged.
 
@@ -98,24 +98,7 @@ def evaluate_model(
         sheet: where a PNG of some pictures goes, each with its labels beside the model's.
 
     Raises:
-        ModelError: it cannot be used, or shares no class with the set. DatasetError: the set cannot be read.
-    """
-    return evaluate_on((read_training_set(dataset),), model, split, settings, sheet=sheet, progress=progress)
-
-
-def evaluate_on(
-    sets: Sequence[TrainingSet],
-    model: Path,
-    split: str,
-    settings: SegmentSettings | None = None,
-    *,
-    sheet: Path | None = None,
-    progress: Callable[[int], None] = lambda _: None,
-) -> Judged:
-    """As evaluate_model, over the pictures of several sets whose classes agree, pooled.
-
-    Raises:
-        ModelError: see evaluate_model. DatasetError: a picture cannot be read.
+        ModelError: it cannot be used, or shares no class with the sets. DatasetError: a picture cannot be read.
     """
     names = sets[0].names
     pairs = pairs_of(sets, split)

@@ -11,17 +11,10 @@ from typing import TYPE_CHECKING, Any
 import wallkit
 from wallkit.dataset.read import TrainingSet, pairs_of, read_pair, read_training_sets
 from wallkit.errors import ModelError
-from wallkit.pipelines.model.evaluate import Judged, evaluate_on
-from wallkit.pipelines.model.unfinished import (
-    check_unfinished,
-    close_unfinished,
-    has_epochs,
-    kept_if_begun,
-    open_unfinished,
-    unfinished_folder,
-)
+from wallkit.pipelines.model.evaluate import Judged, evaluate_model
 from wallkit.pipelines.outputs import check_out, put_in_place
 from wallkit.pipelines.run_folder import write_json
+from wallkit.pipelines.unfinished import Unfinished, unfinished_of
 from wallkit.train.curves import Epoch, csv_of, draw_curves
 from wallkit.train.pictures import Pictures, stacked
 from wallkit.train.score import ClassScore, scores_of
@@ -31,6 +24,8 @@ if TYPE_CHECKING:
 
 LICENCE = "Apache-2.0"
 _MULTIPLE = 16
+# of the epochs that are done, beside the results to be
+_CHECKPOINT = "checkpoint.pt"
 
 
 @dataclass(frozen=True)
@@ -87,20 +82,21 @@ def train_model(
     train = _pictures(sets, "train", (width + width // 4, height + height // 4))
     val = _pictures(sets, "val", request.size)
     fingerprint = _fingerprint(sets, lesson)
-    working = unfinished_folder(out)
-    checkpoint = open_unfinished(working, fingerprint)
+    unfinished = _unfinished(out)
+    unfinished.open(fingerprint)
+    working, checkpoint = unfinished.folder, unfinished.folder / _CHECKPOINT
     fresh: list[int] = []
 
     def hear(epoch: Epoch) -> None:
         fresh.append(epoch.number)
         told(epoch, lesson.epochs)
 
-    with kept_if_begun(working):
+    with unfinished.kept_if_begun():
         learnt = learn(train, val, names, lesson, checkpoint, told=hear)
     parameters = parameters_of(learnt.net)
     about = _about(sets, scores_of(learnt.matrix, names), parameters)
     exported = export_onnx(learnt.net, names, lesson.size, working / "model.onnx", about=about)
-    judged = evaluate_on(sets, working / "model.onnx", "val", sheet=working / "masks.png")
+    judged = evaluate_model(working / "model.onnx", sets, "val", sheet=working / "masks.png")
     (working / "curves.csv").write_text(csv_of(learnt.epochs), encoding="utf-8")
     pictures = f"{len(train)} pictures, {len(val)} of other scenes for validation"
     draw_curves(learnt.epochs, working / "curves.png", title=f"{parameters / 1e6:.2f} M parameters on {pictures}")
@@ -115,7 +111,7 @@ def train_model(
         "export": asdict(exported),
     }
     write_json(working / "run.json", record)
-    close_unfinished(working)
+    unfinished.close()
     put_in_place(working, out)
     resumed = lesson.epochs - len(fresh)
     return Trained(out / "model.onnx", learnt.epochs, judged, exported.size_bytes, parameters, resumed)
@@ -139,9 +135,8 @@ def check_request(request: TrainRequest, out: Path, *, overwrite: bool) -> tuple
         raise ModelError(f"a learning rate of {request.rate:g}", hint="--rate 0.003; above 0, at most 1")
     sets = read_training_sets(request.datasets)
     check_libraries()
-    working = unfinished_folder(out)
-    if has_epochs(working):
-        check_unfinished(working, _fingerprint(sets, lesson_of(request)), overwrite=overwrite)
+    if (unfinished := _unfinished(out)).has_begun:
+        unfinished.check(_fingerprint(sets, lesson_of(request)), overwrite=overwrite)
     return sets
 
 
@@ -170,6 +165,10 @@ def lesson_of(request: TrainRequest) -> Lesson:
 
 
 # -------------------------------------------------------------------------------------------- details
+
+
+def _unfinished(out: Path) -> Unfinished:
+    return unfinished_of(out, "training", _CHECKPOINT)
 
 
 def _pictures(sets: tuple[TrainingSet, ...], split: str, size: tuple[int, int]) -> Pictures:

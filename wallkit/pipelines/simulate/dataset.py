@@ -29,6 +29,7 @@ from wallkit.pipelines.outputs import check_out, put_in_place
 from wallkit.pipelines.run_folder import sha256, write_json
 from wallkit.pipelines.simulate.buildings import random_building
 from wallkit.pipelines.simulate.world import world_from_map
+from wallkit.pipelines.unfinished import unfinished_of
 from wallkit.simulate.camera import photograph, shot_of, solids_by_raster, solids_by_rays
 from wallkit.simulate.gl import backend
 from wallkit.simulate.looks import Wardrobe
@@ -87,17 +88,18 @@ def simulate_dataset(
         progress: told how many pictures are done.
 
     Raises:
-        OutputError, MapError, SimulationError, DatasetError: see check_request; no OpenGL works.
+        OutputError: `out` cannot be used, or an interrupted set of other settings is there.
+        MapError, SimulationError, DatasetError: see check_request; no OpenGL works.
     """
     check_out(out, overwrite=overwrite)
     check_request(request)
     backend()
-    working = out.absolute().with_name(f".{out.name}.unfinished")
-    fingerprint = _fingerprint(request)
-    if not _is_of(working, fingerprint):
-        shutil.rmtree(working, ignore_errors=True)
-        (working / "scenes").mkdir(parents=True)
-        write_json(working / "request.json", fingerprint)
+    # once the set was taken out, nothing would be lost
+    unfinished, fingerprint = unfinished_of(out, "set", "set/images/*/*"), _fingerprint(request)
+    unfinished.check(fingerprint, overwrite=overwrite)
+    unfinished.open(fingerprint)
+    working = unfinished.folder
+    (working / "scenes").mkdir(exist_ok=True)
     layout = _layout(request, working)
     layout.make()
     there = {number for number in range(request.scenes) if _scene_file(working, number).exists()}
@@ -234,16 +236,6 @@ def _layout(request: DatasetRequest, folder: Path) -> Layout:
 
 def _scene_file(folder: Path, number: int) -> Path:
     return folder / "scenes" / f"{number:05d}.json"
-
-
-def _is_of(working: Path, fingerprint: Record) -> bool:
-    """Whether an unfinished folder is of the same request, by the same versions, and its set was not taken out yet."""
-    if not (working / "set").is_dir():
-        return False
-    try:
-        return bool(json.loads((working / "request.json").read_text("utf-8")) == fingerprint)
-    except (OSError, ValueError):
-        return False
 
 
 def _fingerprint(request: DatasetRequest) -> Record:
