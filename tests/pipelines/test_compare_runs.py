@@ -50,6 +50,17 @@ def test_a_log_that_is_a_folder_is_known_by_its_files():
         compared([of_folder], [other])
 
 
+def test_a_calibration_in_the_folder_of_the_log_makes_no_other_log():
+    """The run that looked through the camera names it twice: as a file of the folder, and as a calibration."""
+    calibration = {"path": "bag/front.toml", "bytes": 1, "sha256": "c" * 64}
+    without, with_camera = judged(0.05, log="bag"), judged(0.06, log="bag")
+    for record, _ in (without, with_camera):
+        record.run["inputs"][0]["path"] = "bag/bag_0.db3"
+        record.run["inputs"].append(calibration)
+    with_camera[0].run["inputs"].append(calibration)
+    assert compared([without], [with_camera]).differences
+
+
 def test_seeds_are_paired_by_their_number_not_by_their_place():
     data = compared(several(0.05, (0, 1, 2, 3)), several(0.06, (3, 2, 1, 7)))
     found = {c.key: c for _, _, c in data.differences}

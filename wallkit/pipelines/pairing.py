@@ -70,9 +70,10 @@ def _is_same_log(a: RunRecord, b: RunRecord) -> bool:
 def _hashes(record: RunRecord) -> list[str]:
     """sha256 of every file of the run's logs, sorted; empty where run.json lacks one."""
     logs = [PurePath(log) for log in record.run["logs"]]
-    inputs = [(PurePath(i["path"]), i.get("sha256", "")) for i in record.run.get("inputs", ())]
+    # once each: a calibration that lies in the folder of a log is listed again by the run that used it
+    inputs = {PurePath(i["path"]): i.get("sha256", "") for i in record.run.get("inputs", ())}
     # a log may be a folder, whose files the run lists one by one
-    of_logs = [[digest for path, digest in inputs if path.is_relative_to(log)] for log in logs]
+    of_logs = [[digest for path, digest in inputs.items() if path.is_relative_to(log)] for log in logs]
     found = [digest for digests in of_logs for digest in digests]
     return sorted(found) if all(of_logs) and all(found) else []
 
