@@ -40,11 +40,15 @@ def test_a_run_json_that_is_no_object_is_told(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "words", [("--t-offset", "nan"), ("--t-offset", "1e300"), ("--set", "evaluate.truth_offset_s=nan")]
+    ("words", "said"),
+    [
+        (("--t-offset", "nan"), "Invalid value for '--t-offset': nan is no finite number"),
+        (("--t-offset", "1e300"), "'evaluate.truth_offset_s' is"),
+        (("--set", "evaluate.truth_offset_s=nan"), "'evaluate.truth_offset_s' is"),
+    ],
 )
-def test_an_offset_that_is_no_time_is_told(tmp_path, words):
-    said = refused("evaluate", write_folder(tmp_path / "a", 0.05), *words)
-    assert "'evaluate.truth_offset_s' is" in said
+def test_an_offset_that_is_no_time_is_told(tmp_path, words, said):
+    assert said in refused("evaluate", write_folder(tmp_path / "a", 0.05), *words)
 
 
 def test_a_folder_called_like_a_seed_is_told(tmp_path):
